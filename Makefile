@@ -1,0 +1,51 @@
+# make demo, make test: both work from a bare clone with nothing but python3 and make.
+.PHONY: demo test test-slow bench lint types layers format wheel-check clean
+
+BOOTSTRAP := .bootstrap
+UV := $(BOOTSTRAP)/bin/uv
+PYTHON_VERSION ?= 3.11
+PYTHON := .venv/bin/python
+
+demo: .venv/ready
+	$(PYTHON) -m experiments corridor
+
+test: .venv/ready
+	$(PYTHON) -m pytest -m "not slow"
+
+test-slow: .venv/ready
+	$(PYTHON) -m pytest -m slow
+
+bench: .venv/ready
+	$(PYTHON) -m tests.bench
+
+lint: .venv/ready
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+
+types: .venv/ready
+	.venv/bin/mypy
+
+layers: .venv/ready
+	.venv/bin/lint-imports
+
+format: .venv/ready
+	.venv/bin/ruff check --fix .
+	.venv/bin/ruff format .
+
+# The wheel alone, in a clean environment, in another folder.
+wheel-check: .venv/ready
+	$(PYTHON) tests/wheel_check.py $(UV)
+
+# uv lives in a small environment of its own and finds (or fetches) a Python that has every wheel.
+$(UV):
+	@python3 -m venv $(BOOTSTRAP) 2>/dev/null \
+		|| { rm -rf $(BOOTSTRAP); echo "python3 has no venv module (on Debian: apt install python3-venv)" >&2; exit 1; }
+	$(BOOTSTRAP)/bin/python -m pip install --quiet --disable-pip-version-check uv
+
+.venv/ready: $(UV) pyproject.toml
+	$(UV) venv --quiet --clear --python $(PYTHON_VERSION) .venv
+	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,dev]"
+	touch $@
+
+clean:
+	rm -rf .venv $(BOOTSTRAP) dist build

@@ -1,0 +1,160 @@
+"""The `stereogrid` command. The one place where a StereogridError becomes one line and exit code 1."""
+
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import click
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import track as rich_track
+from rich.table import Table
+
+from . import mapping_run
+from .config import MappingConfig, load_config, save_config
+from .errors import InvalidInputError, StereogridError
+from .grid import OccupancyGrid
+from .recording import TruePoses, open_recording
+from .scoring import Score
+from .scoring.truth import MapTruth
+
+app = typer.Typer(
+    name="stereogrid",
+    help="Probabilistic 3D occupancy maps from stereo recordings.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+console = Console()
+progress_console = Console(stderr=True)
+Item = TypeVar("Item")
+
+RecordingPath = Annotated[Path, typer.Argument(help="A recording: an MCAP file of ours or a KITTI-odometry folder.")]
+
+
+@app.command("map", epilog="Example: stereogrid map drive.mcap --matcher sgbm --cell 0.05 --out map.sgrid")
+def map_command(
+    recording: RecordingPath,
+    out: Annotated[Path | None, typer.Option(help="Also save the map here (.sgrid).")] = None,
+    config: Annotated[Path | None, typer.Option(help="A config.toml; the options below override it.")] = None,
+    matcher: Annotated[str | None, typer.Option(help="bm or sgbm.")] = None,
+    num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
+    cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
+    max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
+    poses: Annotated[str, typer.Option(help="odometry (what the recording claims) or truth.")] = "odometry",
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Map a recording: runs/<stamp>-<name>/ gets the map, figures, metrics.json, config.toml and report.html."""
+    source = open_recording(recording)
+    if poses not in ("odometry", "truth"):
+        raise InvalidInputError(f"--poses must be odometry or truth, not {poses!r}")
+    chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
+    chosen = _overridden(chosen, matcher, num_disparities, cell, max_range)
+    result = mapping_run.map_recording(
+        TruePoses(source) if poses == "truth" else source,
+        chosen,
+        name=recording.resolve().stem,
+        runs=runs,
+        out=out,
+        command=" ".join(["stereogrid", *sys.argv[1:]]),
+        track=lambda items, total: track(items, "mapping", total),
+    )
+    _print_scores(result.scores)
+    console.print(f"{result.grid!r}\n{result.folder}", highlight=False, soft_wrap=True)
+
+
+def _overridden(
+    config: MappingConfig, matcher: str | None, num_disparities: int | None, cell: float | None, max_range: float | None
+) -> MappingConfig:
+    """config with the options that were given on the command line."""
+    if matcher is not None:
+        config = replace(config, matcher=replace(config.matcher, name=matcher))
+    if num_disparities is not None:
+        config = replace(config, matcher=replace(config.matcher, num_disparities=num_disparities))
+    if cell is not None:
+        config = replace(config, grid=replace(config.grid, cell_m=cell))
+    if max_range is not None:
+        config = replace(config, model=replace(config.model, max_range_m=max_range))
+    return config
+
+
+@app.command(epilog="Example: stereogrid info drive.mcap")
+def info(recording: RecordingPath) -> None:
+    """Say what a recording or a map holds."""
+    if recording.suffix == ".sgrid":
+        console.print(repr(OccupancyGrid.load(recording)), highlight=False, soft_wrap=True)
+        return
+    source = open_recording(recording)
+    positions = np.array([observation.T_world_cam[:3, 3] for observation in track(source, "reading", len(source))])
+    length_m = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+    console.print(
+        f"{type(source).__name__}: {len(source)} observations, path {length_m:.2f} m\n{source.camera}",
+        highlight=False,
+        soft_wrap=True,
+    )
+    for key, value in getattr(source, "metadata", {}).items():
+        console.print(f"{key}: {value}", highlight=False, soft_wrap=True)
+    if getattr(source, "damage", None):
+        console.print(f"incomplete: {source.damage}", highlight=False, soft_wrap=True)  # type: ignore[attr-defined]
+
+
+@app.command(epilog="Example: stereogrid score map.sgrid drive.mcap --range 5")
+def score(
+    grid: Annotated[Path, typer.Argument(help="A map file (.sgrid).")],
+    recording: Annotated[Path, typer.Argument(help="The recording it was made from, with its truth (an MCAP file).")],
+    max_range: Annotated[float, typer.Option("--range", help="Score cells seen within this range [m].")] = 5.0,
+) -> None:
+    """Score a map against the true mesh and poses that a simulated recording carries. Needs the extra `score`."""
+    loaded = OccupancyGrid.load(grid)
+    truth = MapTruth.of_recording(open_recording(recording), loaded.cell_m, max_range_m=max_range)
+    _print_scores(truth.score(loaded))
+
+
+@app.command("config", epilog="Example: stereogrid config my.toml")
+def config_command(path: Annotated[Path, typer.Argument(help="Where to write it.")]) -> None:
+    """Write a config.toml with every parameter at its default."""
+    save_config(MappingConfig(), path)
+
+
+def track(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:
+    """items, with a progress bar on stderr."""
+    yield from rich_track(items, description=what, total=total, console=progress_console, transient=True)
+
+
+def _print_scores(scores: Iterable[Score]) -> None:
+    table = Table("score", "value", "unit", "n", box=None)
+    for row in scores:
+        unit = "" if row.unit == "1" else row.unit
+        table.add_row(row.name, f"{row.value:.4g}", unit, f"{row.n:,}")
+    console.print(table)
+
+
+def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
+    """Run a typer command; errors that the user can put right become one line on stderr. The exit code."""
+    try:
+        command(args=arguments, standalone_mode=False)
+    except StereogridError as error:
+        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        return 1
+    except click.exceptions.Exit as stop:
+        return stop.exit_code
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        print("stopped", file=sys.stderr)  # noqa: T201
+        return 130
+    return 0
+
+
+def main() -> None:
+    """The console script."""
+    sys.exit(run(app))
+
+
+if __name__ == "__main__":
+    main()

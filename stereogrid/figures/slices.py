@@ -1,0 +1,74 @@
+"""The 2D slice of the map parallel to the ground (the paper's Fig. 7)."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from ..errors import InvalidInputError
+from ..geometry import Array, FloatArray
+from ..grid import OccupancyGrid
+
+UNKNOWN_COLOUR = "#c9d3e3"
+PATH_COLOUR = "#d62728"
+TRUTH_COLOUR = "#2ca02c"
+LARGEST_CELLS = 4000
+"""Pixels along the longer edge; larger maps are sampled more coarsely."""
+
+
+def slice_figure(
+    grid: OccupancyGrid,
+    height_m: float,
+    *,
+    path_m: FloatArray | None = None,
+    truth_segments_m: FloatArray | None = None,
+    title: str = "",
+) -> Figure:
+    """p(occupied) at z = height_m [m] in world: white free, black occupied, blue-grey unknown.
+
+    path_m (N, 3): where the camera went, drawn in red. truth_segments_m (S, 2, 3): the true surfaces' section
+    with the plane, in green.
+    """
+    x, y, p = _sample(grid, height_m)
+    span = (x[-1] - x[0]) / max(y[-1] - y[0], 1e-9)
+    figure = Figure(figsize=(9, float(np.clip(9 / span, 3.0, 9)) + 0.8), layout="constrained")
+    axes = figure.add_subplot()
+    half = (x[1] - x[0]) / 2
+    axes.set_facecolor(UNKNOWN_COLOUR)
+    image = axes.imshow(
+        p.T,
+        origin="lower",
+        extent=(x[0] - half, x[-1] + half, y[0] - half, y[-1] + half),
+        cmap="gray_r",
+        vmin=0,
+        vmax=1,
+        interpolation="nearest",
+    )
+    figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
+    _overlays(axes, path_m, truth_segments_m)
+    axes.set(xlabel="x (world) [m]", ylabel="y (world) [m]", title=title or f"Slice at z = {height_m:.2f} m")
+    return figure
+
+
+def _sample(grid: OccupancyGrid, height_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cell centres x (X,), y (Y,) [m] of the known part of the slice and p (X, Y), NaN = unknown."""
+    cells, _ = grid.known_cells()
+    layer = cells[cells[:, 2] == np.floor(height_m / grid.cell_m)]
+    if not len(layer):
+        raise InvalidInputError(f"the map knows no cell at z = {height_m:.2f} m, so there is no slice to draw")
+    low, high = layer[:, :2].min(axis=0) - 1, layer[:, :2].max(axis=0) + 2
+    stride = int(np.ceil((high - low).max() / LARGEST_CELLS))
+    x, y = ((np.arange(a, b, stride) + 0.5) * grid.cell_m for a, b in zip(low, high, strict=True))
+    points = np.stack([*np.meshgrid(x, y, indexing="ij"), np.full((len(x), len(y)), height_m)], axis=-1)
+    return x, y, grid.probability(points.reshape(-1, 3)).reshape(len(x), len(y))
+
+
+def _overlays(axes: Axes, path_m: Array | None, truth_segments_m: Array | None) -> None:
+    if truth_segments_m is not None and len(truth_segments_m):
+        lines = LineCollection(list(truth_segments_m[:, :, :2]), colors=TRUTH_COLOUR, linewidths=0.7, label="truth")
+        axes.add_collection(lines, autolim=False)
+    if path_m is not None:
+        axes.plot(path_m[:, 0], path_m[:, 1], color=PATH_COLOUR, linewidth=1.2, label="camera path")
+        axes.plot(*path_m[0, :2], "o", color=PATH_COLOUR, markersize=4)
+    if path_m is not None or truth_segments_m is not None:
+        axes.legend(loc="best", fontsize=8, framealpha=0.9)

@@ -1,0 +1,63 @@
+"""The literal reading of the paper: every ray updates every cell it crosses, and all of them add up."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..geometry import Array
+from ..sensor_model import REACH_SIGMAS
+from .kernels import BLOCK, evidence
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Array, model: tuple, out: Array) -> None:  # type: ignore[type-arg]
+    """Add to out (B, 16, 16, 16), NaN = untouched, the evidence of every valid pixel for every cell on its ray.
+
+    Arguments as in kernels.vote_hits. Cells are visited in order along the ray (Amanatides and Woo 1987), up to
+    where nothing more is learnt behind the measured surface; each is judged at the point of the ray nearest to
+    its centre.
+    """
+    focal, cx, cy, focal_baseline, cell, range_max = camera
+    step, cross = np.empty(3, np.int64), np.empty(3)
+    stride, at, direction = np.empty(3), np.empty(3, np.int64), np.empty(3)
+    for row in range(image.shape[0]):
+        for column in range(image.shape[1]):
+            disparity, ratio = image[row, column, 0], image[row, column, 1]
+            if not disparity > 0:
+                continue
+            x, y = (column - cx) / focal, (row - cy) / focal
+            norm = math.sqrt(x * x + y * y + 1)
+            measured = focal_baseline / disparity * norm
+            sigma = measured / ratio
+            for axis in range(3):
+                direction[axis] = (pose[axis, 0] * x + pose[axis, 1] * y + pose[axis, 2]) / norm
+                at[axis] = math.floor(pose[axis, 3] / cell)
+                step[axis] = 1 if direction[axis] > 0 else -1
+                stride[axis] = cell / abs(direction[axis])
+                ahead = (at[axis] + (direction[axis] > 0)) * cell - pose[axis, 3]
+                cross[axis] = ahead / direction[axis] if direction[axis] != 0 else np.inf
+            end = min(measured + 0.5 * cell + REACH_SIGMAS * sigma, range_max)
+            entry = 0.0
+            while entry < end:
+                axis = 0 if cross[0] < cross[1] else 1
+                if cross[2] < cross[axis]:
+                    axis = 2
+                along = 0.0
+                for other in range(3):
+                    along += direction[other] * ((at[other] + 0.5) * cell - pose[other, 3])
+                if cell <= along <= range_max:
+                    _add(lookup, origin, at, evidence((along - measured) / sigma, 0.5 * cell / sigma, model), out)
+                entry = cross[axis]
+                cross[axis] += stride[axis]
+                at[axis] += step[axis]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _add(lookup: Array, origin: Array, at: Array, gain: float, out: Array) -> None:
+    a, b, c = at[0] // BLOCK - origin[0], at[1] // BLOCK - origin[1], at[2] // BLOCK - origin[2]
+    if 0 <= a < lookup.shape[0] and 0 <= b < lookup.shape[1] and 0 <= c < lookup.shape[2]:
+        block = lookup[a, b, c]
+        if block >= 0:
+            old = out[block, at[0] % BLOCK, at[1] % BLOCK, at[2] % BLOCK]
+            out[block, at[0] % BLOCK, at[1] % BLOCK, at[2] % BLOCK] = gain if np.isnan(old) else old + gain

@@ -1,0 +1,141 @@
+"""A whole run of the mapper on a recording: map, checks, figures and report in one run folder."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .config import MappingConfig, save_config
+from .errors import InvalidInputError, RecordingError
+from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
+from .geometry import FloatArray
+from .grid import OccupancyGrid
+from .observation import Disparity, Observation, Recording
+from .report import ReportFigure, write_metrics, write_report
+from .runs import finished_path, run_folder
+from .scoring import Score, scores_to_dict
+from .scoring.ground import camera_height
+
+Track = Callable[[Iterable[Observation], int], Iterator[Observation]]
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A map and what is remembered of its making.
+
+    path_T_world_cam (M, 4, 4): where the camera was taken to be; sample: an observation from the middle of the
+    drive with its disparity, for figures; density: mean share of matched pixels.
+    """
+
+    grid: OccupancyGrid
+    path_T_world_cam: FloatArray
+    sample: tuple[Observation, Disparity]
+    density: float
+
+    @property
+    def path_m(self) -> FloatArray:
+        """Positions of the camera (M, 3) in world [m]."""
+        return self.path_T_world_cam[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class MappingResult:
+    """folder: where everything stands; grid: the map; scores: what can be said without a true mesh."""
+
+    folder: Path
+    grid: OccupancyGrid
+    scores: list[Score]
+
+
+def untracked(items: Iterable[Observation], total: int) -> Iterator[Observation]:  # noqa: ARG001
+    """No progress bar."""
+    yield from items
+
+
+def build_map(recording: Recording, config: MappingConfig, track: Track = untracked) -> Mapped:
+    """Map a recording. Raises RecordingError when it holds no observation."""
+    mapper = config.build_mapper(recording.camera)
+    poses, densities, sample = [], [], None
+    for n, observation in enumerate(track(recording, len(recording))):
+        disparity = mapper.step(observation)
+        poses.append(observation.T_world_cam)
+        densities.append(disparity.density)
+        if n == len(recording) // 2:
+            sample = (observation, disparity)
+    if sample is None:
+        raise RecordingError("the recording holds no complete observation, so there is nothing to map")
+    return Mapped(mapper.grid, np.array(poses), sample, float(np.mean(densities)))
+
+
+def map_recording(
+    recording: Recording,
+    config: MappingConfig,
+    *,
+    name: str,
+    runs: Path,
+    out: Path | None = None,
+    command: str = "",
+    track: Track = untracked,
+) -> MappingResult:
+    """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid)."""
+    if out is not None and not out.parent.is_dir():
+        raise InvalidInputError(f"{out.parent}: no such folder, so {out.name} cannot be written there")
+    config.build_mapper(recording.camera)  # refuses what cannot work before anything is written
+    with run_folder(runs, name) as folder:
+        mapped = build_map(recording, config, track)
+        scores = [
+            camera_height(mapped.grid, mapped.path_m),
+            Score("disparity_density", mapped.density, "1", len(mapped.path_m)),
+            Score("known_cells", mapped.grid.n_known, "cell", mapped.grid.n_known),
+        ]
+        save_config(config, folder / "config.toml")
+        mapped.grid.save(folder / "map.sgrid")
+        write_metrics(folder, {"command": command, "scores": scores_to_dict(scores)})
+        write_report(
+            folder,
+            f"Map of {name}",
+            summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
+            arms={"map": scores},
+            figures=draw_map(mapped, recording, folder),
+            facts={"command": command, "map sha256": mapped.grid.sha256()},
+        )
+        if out is not None:
+            mapped.grid.save(out)
+    return MappingResult(finished_path(folder), mapped.grid, scores)
+
+
+def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options: Any) -> list[ReportFigure]:
+    """Disparity, slice and cubes of a map as PNG files in folder."""
+    observation, disparity = mapped.sample
+    height_m = float(np.median(mapped.path_m[:, 2]))
+    ground_m = -camera_height(mapped.grid, mapped.path_m).value
+    eye_m = max(3.0, 0.4 * mapped.grid.model.max_range_m)
+    drawings = {
+        "disparity": (
+            disparity_figure(observation.left, disparity),
+            "The left image in the middle of the drive and its disparity.",
+        ),
+        "slice": (
+            slice_figure(mapped.grid, height_m, path_m=mapped.path_m, **slice_options),
+            f"Slice of the map parallel to the ground at the camera's height, z = {height_m:.2f} m (Fig. 7).",
+        ),
+        "cubes": (
+            cubes_figure(
+                mapped.grid,
+                observation.T_world_cam,
+                recording.camera,
+                back_and_up_m=(1.4 * eye_m, eye_m),
+                path_m=mapped.path_m,
+                heights_m=(-np.inf, 1.0),
+                ground_m=ground_m + 1.6 * mapped.grid.cell_m if np.isfinite(ground_m) else None,
+            ),
+            "Occupied cells as cubes, higher ones lighter, ground in grey; the camera in red (Fig. 9). "
+            "Cells more than 1 m above the camera are left out.",
+        ),
+    }
+    return [
+        ReportFigure(save_figure(figure, folder / f"{name}.png"), caption)
+        for name, (figure, caption) in drawings.items()
+    ]

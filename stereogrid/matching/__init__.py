@@ -1,0 +1,26 @@
+"""Disparity from a rectified pair. Each matcher is one file; MATCHERS is the whole list."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import InvalidInputError, unknown_name
+from ..observation import Matcher
+from .block import BlockMatcher
+from .semiglobal import SemiGlobalMatcher
+
+MATCHERS: dict[str, Callable[..., Matcher]] = {"bm": BlockMatcher, "sgbm": SemiGlobalMatcher}
+
+
+def matcher(name: str, **options: Any) -> Matcher:
+    """The matcher called name, e.g. matcher("bm", num_disparities=64). Unknown names and options are refused."""
+    if name not in MATCHERS:
+        raise unknown_name("matcher", name, MATCHERS)
+    known = inspect.signature(MATCHERS[name]).parameters
+    for option in options:
+        if option not in known:
+            raise InvalidInputError(f"matcher {name!r} has no option {option!r}; choose from: {', '.join(known)}")
+    return MATCHERS[name](**options)
+
+
+__all__ = ["MATCHERS", "BlockMatcher", "SemiGlobalMatcher", "matcher"]

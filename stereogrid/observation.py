@@ -1,0 +1,132 @@
+"""What flows through the house: readings, disparities, and the protocols of those who make them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .camera import StereoCamera
+from .errors import InvalidInputError
+from .geometry import FloatArray, as_pose
+
+Image = NDArray[np.uint8]
+FloatImage = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Odometry:
+    """Where the robot believes it is.
+
+    T_odom_base: (4, 4); travelled_m and turned_rad: path length and sum of |turns| since the pose was
+    last certain, which feed eps of Eq. 13.
+    """
+
+    T_odom_base: FloatArray
+    travelled_m: float = 0.0
+    turned_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_odom_base", as_pose(self.T_odom_base, "T_odom_base"))
+        if not (self.travelled_m >= 0 and self.turned_rad >= 0):
+            raise InvalidInputError(
+                f"travelled_m and turned_rad must be >= 0, not {self.travelled_m} and {self.turned_rad}"
+            )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What only a simulator or a reference instrument knows: T_world_cam (4, 4), depth_m (H, W) or None."""
+
+    T_world_cam: FloatArray
+    depth_m: FloatImage | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_cam", as_pose(self.T_world_cam, "true T_world_cam"))
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One stereo reading: rectified images (H, W) uint8, odometry, and the left camera's claimed pose.
+
+    T_world_cam (4, 4) is what the recording claims; truth, where known, is kept apart.
+    """
+
+    stamp_s: float
+    left: Image
+    right: Image
+    odometry: Odometry
+    T_world_cam: FloatArray
+    truth: Truth | None = None
+
+    def __post_init__(self) -> None:
+        check_pair(self.left, self.right)
+        if not np.isfinite(self.stamp_s):
+            raise InvalidInputError(f"stamp_s must be finite, not {self.stamp_s}")
+        object.__setattr__(self, "T_world_cam", as_pose(self.T_world_cam, "T_world_cam"))
+
+
+def check_pair(left: NDArray[Any], right: NDArray[Any]) -> None:
+    """Raise InvalidInputError unless both images are (H, W) uint8 of one size."""
+    for side, image in (("left", left), ("right", right)):
+        if not isinstance(image, np.ndarray) or image.ndim != 2 or image.dtype != np.uint8:
+            seen = f"{getattr(image, 'shape', type(image).__name__)} {getattr(image, 'dtype', '')}".strip()
+            raise InvalidInputError(f"the {side} image must be (H, W) uint8, not {seen}")
+    if left.shape != right.shape:
+        raise InvalidInputError(f"left and right images differ in size: {left.shape} and {right.shape}")
+
+
+@dataclass(frozen=True)
+class Disparity:
+    """disparity_px = x_left - x_right > 0 and its standard deviation sigma_px, (H, W) float32, NaN = no match."""
+
+    disparity_px: FloatImage
+    sigma_px: FloatImage
+
+    def __post_init__(self) -> None:
+        d = np.ascontiguousarray(self.disparity_px, dtype=np.float32)
+        sigma = np.ascontiguousarray(np.broadcast_to(np.float32(self.sigma_px), d.shape))
+        if d.ndim != 2:
+            raise InvalidInputError(f"disparity_px must be (H, W), not {d.shape}")
+        for name, array in (("disparity_px", d), ("sigma_px", sigma)):
+            if np.isinf(array).any() or (array <= 0).any():
+                raise InvalidInputError(f"{name} must be positive and finite, or NaN where nothing matched")
+        object.__setattr__(self, "disparity_px", d)
+        object.__setattr__(self, "sigma_px", sigma)
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(H, W) True where a match was found."""
+        return ~np.isnan(self.disparity_px)
+
+    @property
+    def density(self) -> float:
+        """Share of matched pixels, 0 to 1."""
+        return float(self.valid.mean())
+
+
+@runtime_checkable
+class Matcher(Protocol):
+    """Finds disparities. Implementations: stereogrid.matching.MATCHERS."""
+
+    def match(self, left: Image, right: Image) -> Disparity:
+        """The disparity of each pixel of the left image (H, W) uint8, NaN where no match is trusted."""
+        ...
+
+
+@runtime_checkable
+class Source(Protocol):
+    """Anything that yields observations in the order of their stamps: a recording, a simulator, the robot."""
+
+    camera: StereoCamera
+    T_base_cam: FloatArray
+
+    def __iter__(self) -> Iterator[Observation]: ...
+
+
+@runtime_checkable
+class Recording(Source, Protocol):
+    """A Source of known length that can be read again."""
+
+    def __len__(self) -> int: ...

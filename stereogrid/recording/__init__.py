@@ -1,0 +1,59 @@
+"""Recorded drives: one file a format, looked up in RECORDINGS."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..observation import Recording
+from .kitti import KittiRecording, is_kitti
+from .mcap import McapRecording, McapWriter
+from .mcap_scan import is_mcap
+from .views import ShuffledPoses, Subset, TruePoses, poses
+
+__all__ = [
+    "RECORDINGS",
+    "KittiRecording",
+    "McapRecording",
+    "McapWriter",
+    "RecordingKind",
+    "ShuffledPoses",
+    "Subset",
+    "TruePoses",
+    "open_recording",
+    "poses",
+]
+
+
+@dataclass(frozen=True)
+class RecordingKind:
+    """How a kind of recording is known from its path, how it is opened, and what it needs, in words."""
+
+    recognises: Callable[[Path], bool]
+    open: Callable[[Path], Recording]
+    needs: str
+
+
+RECORDINGS = {
+    "mcap": RecordingKind(is_mcap, McapRecording, "a file written by stereogrid, *.mcap"),
+    "kitti": RecordingKind(
+        is_kitti,
+        KittiRecording,
+        "a folder with image_0 and image_1 (or image_l and image_r), calib.txt, poses.txt",
+    ),
+}
+
+
+def open_recording(path: str | Path) -> Recording:
+    """The recording at `path`, its kind found from what is there.
+
+    Raises RecordingError when nothing is there, it is of no known kind, or it is wrong in itself.
+    """
+    place = Path(path)
+    if not place.exists():
+        raise RecordingError(f"{place}: no such file or folder")
+    for kind in RECORDINGS.values():
+        if kind.recognises(place):
+            return kind.open(place)
+    kinds = "; ".join(f"{name}: {kind.needs}" for name, kind in RECORDINGS.items())
+    raise RecordingError(f"{place}: no known kind of recording; choose from {kinds}")

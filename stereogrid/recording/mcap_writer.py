@@ -1,0 +1,160 @@
+"""Writes observations as ROS 2 messages to an MCAP file that stays readable when the run is killed."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO
+
+import mcap_ros2.writer
+
+from ..camera import StereoCamera
+from ..errors import InvalidInputError, RecordingError
+from ..geometry import FloatArray, as_pose
+from ..observation import Observation
+from . import ros2_messages as ros2
+from .ros2_schemas import SCHEMAS
+
+FORMAT_VERSION = "1"
+METADATA_NAME = "stereogrid"
+MESH_NAME = "truth_mesh.ply"
+
+
+class McapWriter:
+    """Writes observations to `path` as they come; use it in a `with` block, which finishes the file.
+
+    Each message is a chunk of its own and is flushed with its observation, so a killed run leaves every
+    observation that was written, and poses can be read without the images. Nothing depends on the clock:
+    the same observations give the same bytes. An observation's pose is written as its odometry;
+    T_world_cam is not, since a reader makes it from T_odom_base @ T_base_cam.
+
+    metadata: text kept in the file. truth_mesh_ply: the bytes of the true world's mesh.
+    Raises RecordingError when the file exists (unless overwrite) or cannot be written, InvalidInputError
+    when an argument is wrong.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        camera: StereoCamera,
+        T_base_cam: FloatArray,
+        *,
+        metadata: Mapping[str, str] | None = None,
+        truth_mesh_ply: bytes | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        self.path = Path(path)
+        self.camera = camera
+        self.T_base_cam = as_pose(T_base_cam, "T_base_cam")
+        checked = _checked_metadata(metadata or {})
+        self._last_stamp_ns: int | None = None
+        self._file = self._open("wb" if overwrite else "xb")
+        with self._reporting():
+            # A limit of zero bytes closes a chunk after every message.
+            self._mcap = mcap_ros2.writer.Writer(self._file, chunk_size=0)
+            self._schemas = {
+                name: self._mcap.register_msgdef(name, SCHEMAS[name])
+                for name in sorted(set(ros2.TOPICS.values()))
+            }
+            self._mcap.add_metadata(METADATA_NAME, checked)
+            if truth_mesh_ply is not None:
+                self._mcap.add_attachment(0, 0, MESH_NAME, "model/ply", truth_mesh_ply)
+            self._file.flush()
+
+    def write(self, observation: Observation) -> None:
+        """Append one observation.
+
+        Raises InvalidInputError when its images are not the camera's size or its stamp does not increase,
+        RecordingError when the file cannot be written.
+        """
+        stamp_ns = self._checked_stamp_ns(observation)
+        with self._reporting():
+            if self._last_stamp_ns is None:
+                self._message(
+                    ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam)
+                )
+            # The right image comes last: an observation that has it is whole.
+            for topic, message in self._messages(stamp_ns, observation):
+                self._message(topic, stamp_ns, message)
+            self._file.flush()
+        self._last_stamp_ns = stamp_ns
+
+    def close(self) -> None:
+        """Write the index and close the file; closing again does nothing."""
+        if not self._file.closed:
+            with self._reporting(), self._file:
+                self._mcap.finish()
+
+    def __enter__(self) -> "McapWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _messages(self, stamp_ns: int, observation: Observation) -> Iterator[tuple[str, ros2.Message]]:
+        yield ros2.LEFT_INFO, ros2.camera_info_message(stamp_ns, self.camera, right=False)
+        yield ros2.RIGHT_INFO, ros2.camera_info_message(stamp_ns, self.camera, right=True)
+        yield ros2.ODOMETRY, ros2.odometry_message(stamp_ns, observation.odometry.T_odom_base)
+        truth = observation.truth
+        if truth is not None:
+            yield ros2.TRUE_POSE, ros2.true_pose_message(stamp_ns, truth.T_world_cam)
+            if truth.depth_m is not None:
+                yield ros2.TRUE_DEPTH, ros2.depth_message(stamp_ns, truth.depth_m)
+        yield ros2.LEFT_IMAGE, ros2.image_message(stamp_ns, observation.left)
+        yield ros2.RIGHT_IMAGE, ros2.image_message(stamp_ns, observation.right)
+
+    def _message(self, topic: str, stamp_ns: int, message: ros2.Message) -> None:
+        self._mcap.write_message(topic, self._schemas[ros2.TOPICS[topic]], message, stamp_ns, stamp_ns)
+
+    def _checked_stamp_ns(self, observation: Observation) -> int:
+        truth = observation.truth
+        depth = None if truth is None else truth.depth_m
+        for name, image in (("image", observation.left), ("true depth", depth)):
+            if image is not None and image.shape != self.camera.shape:
+                raise InvalidInputError(
+                    f"the {name} is {image.shape}, the recording's camera {self.camera.shape}"
+                )
+        stamp_ns = ros2.stamp_to_ns(observation.stamp_s)
+        if self._last_stamp_ns is not None and stamp_ns <= self._last_stamp_ns:
+            raise InvalidInputError(
+                f"stamps must increase: {observation.stamp_s} s follows {self._last_stamp_ns / 1e9} s"
+            )
+        return stamp_ns
+
+    def _open(self, mode: str) -> BinaryIO:
+        try:
+            file: BinaryIO = self.path.open(mode)  # type: ignore[assignment]
+        except FileExistsError:
+            raise RecordingError(
+                f"{self.path}: exists already; give another path or overwrite=True"
+            ) from None
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+        return file
+
+    @contextmanager
+    def _reporting(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+
+def _checked_metadata(metadata: Mapping[str, str]) -> dict[str, str]:
+    own = {"format_version": FORMAT_VERSION, "stereogrid_version": _library_version()}
+    for key, value in metadata.items():
+        if not isinstance(key, str) or not isinstance(value, str):
+            raise InvalidInputError(f"metadata must be text: {key!r} is {value!r}")
+        if key in own:
+            raise InvalidInputError(f"metadata {key!r} is written by the recording itself")
+    return {**own, **metadata}
+
+
+def _library_version() -> str:
+    try:
+        return version("stereogrid")
+    except PackageNotFoundError:
+        return "unknown"

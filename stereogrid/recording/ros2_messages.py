@@ -1,0 +1,195 @@
+"""Poses, cameras and images as ROS 2 messages: built as dicts, read from what mcap_ros2 decodes."""
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from functools import cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from mcap.records import Schema
+from mcap_ros2.decoder import DecoderFactory
+
+from ..camera import StereoCamera
+from ..errors import InvalidInputError
+from ..geometry import FloatArray, as_pose, from_quaternion_wxyz, quaternion_wxyz
+from ..observation import FloatImage, Image
+from .images import encode_png
+from .ros2_schemas import SCHEMAS
+
+Message: TypeAlias = dict[str, Any]
+
+LEFT_IMAGE = "/left/image_rect/compressed"
+RIGHT_IMAGE = "/right/image_rect/compressed"
+LEFT_INFO = "/left/camera_info"
+RIGHT_INFO = "/right/camera_info"
+ODOMETRY = "/odom"
+TF_STATIC = "/tf_static"
+TRUE_POSE = "/truth/pose"
+TRUE_DEPTH = "/truth/depth"
+
+TOPICS = {
+    TF_STATIC: "tf2_msgs/msg/TFMessage",
+    LEFT_INFO: "sensor_msgs/msg/CameraInfo",
+    RIGHT_INFO: "sensor_msgs/msg/CameraInfo",
+    ODOMETRY: "nav_msgs/msg/Odometry",
+    TRUE_POSE: "geometry_msgs/msg/PoseStamped",
+    TRUE_DEPTH: "sensor_msgs/msg/Image",
+    LEFT_IMAGE: "sensor_msgs/msg/CompressedImage",
+    RIGHT_IMAGE: "sensor_msgs/msg/CompressedImage",
+}
+"""Message type of each topic, in the order in which an observation is written."""
+
+CAMERA_FRAME = "left_camera_optical"
+BASE_FRAME = "base_link"
+
+_LAST_STAMP_NS = (2**31 - 1) * 10**9
+
+
+def stamp_to_ns(stamp_s: float) -> int:
+    """The nearest whole nanosecond; ns / 1e9 gives stamp_s back to half a nanosecond.
+
+    Raises InvalidInputError outside 0 to 2^31 s, which is what a ROS 2 stamp can hold.
+    """
+    # Exact arithmetic: stamp_s * 1e9 in floats is off by a hundred ns at today's Unix time.
+    ns = round(Fraction(stamp_s) * 10**9)
+    if not 0 <= ns <= _LAST_STAMP_NS:
+        raise InvalidInputError(f"stamp_s must be between 0 and 2^31 s to be recorded, not {stamp_s}")
+    return ns
+
+
+def header(stamp_ns: int, frame_id: str) -> Message:
+    """std_msgs/Header."""
+    sec, nanosec = divmod(stamp_ns, 10**9)
+    return {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": frame_id}
+
+
+def header_stamp_ns(decoded_header: Any) -> int:
+    """The stamp of a decoded std_msgs/Header [ns]."""
+    return int(decoded_header.stamp.sec) * 10**9 + int(decoded_header.stamp.nanosec)
+
+
+def _vector(xyz: FloatArray) -> dict[str, float]:
+    return dict(zip("xyz", xyz.tolist(), strict=True))
+
+
+def _quaternion(T: FloatArray) -> dict[str, float]:
+    return dict(zip("wxyz", quaternion_wxyz(T).tolist(), strict=True))
+
+
+def pose_message(T: FloatArray) -> Message:
+    """geometry_msgs/Pose of a (4, 4) pose."""
+    return {"position": _vector(T[:3, 3]), "orientation": _quaternion(T)}
+
+
+def odometry_message(stamp_ns: int, T_odom_base: FloatArray) -> Message:
+    """nav_msgs/Odometry, odom -> base_link; covariance and twist stay zero, that is, unknown."""
+    return {
+        "header": header(stamp_ns, "odom"),
+        "child_frame_id": BASE_FRAME,
+        "pose": {"pose": pose_message(T_odom_base)},
+    }
+
+
+def true_pose_message(stamp_ns: int, T_world_cam: FloatArray) -> Message:
+    """geometry_msgs/PoseStamped of the left camera in the frame `world`."""
+    return {"header": header(stamp_ns, "world"), "pose": pose_message(T_world_cam)}
+
+
+def static_transform_message(stamp_ns: int, T_base_cam: FloatArray) -> Message:
+    """tf2_msgs/TFMessage with the one transform base_link -> left_camera_optical."""
+    transform = {"translation": _vector(T_base_cam[:3, 3]), "rotation": _quaternion(T_base_cam)}
+    stamped = {"header": header(stamp_ns, BASE_FRAME), "child_frame_id": CAMERA_FRAME, "transform": transform}
+    return {"transforms": [stamped]}
+
+
+def camera_info_message(stamp_ns: int, camera: StereoCamera, *, right: bool) -> Message:
+    """sensor_msgs/CameraInfo of one rectified camera.
+
+    Both stand in the left camera's frame, as stereo_image_proc wants it.
+    """
+    return {
+        "header": header(stamp_ns, CAMERA_FRAME),
+        "height": camera.height_px,
+        "width": camera.width_px,
+        "distortion_model": "plumb_bob",
+        "d": [0.0] * 5,
+        "k": camera.K.ravel().tolist(),
+        "r": np.eye(3).ravel().tolist(),
+        "p": camera.P[right].ravel().tolist(),
+    }
+
+
+def image_message(stamp_ns: int, image: Image) -> Message:
+    """sensor_msgs/CompressedImage: a PNG of the (H, W) uint8 image."""
+    return {
+        "header": header(stamp_ns, CAMERA_FRAME),
+        "format": "mono8; png compressed",
+        "data": encode_png(image),
+    }
+
+
+def depth_message(stamp_ns: int, depth_m: FloatImage) -> Message:
+    """sensor_msgs/Image 32FC1 of a depth image (H, W) [m], NaN where unknown (REP 118)."""
+    depth = np.ascontiguousarray(depth_m, dtype="<f4")
+    height, width = depth.shape
+    return {
+        "header": header(stamp_ns, CAMERA_FRAME),
+        "height": height,
+        "width": width,
+        "encoding": "32FC1",
+        "is_bigendian": 0,
+        "step": 4 * width,
+        "data": depth.tobytes(),
+    }
+
+
+@cache
+def decoder(type_name: str) -> Callable[[bytes], Any]:
+    """Decodes the CDR bytes of a message by our own definition; the file's might be hostile."""
+    schema = Schema(id=1, name=type_name, encoding="ros2msg", data=SCHEMAS[type_name].encode())
+    decode: Callable[[bytes], Any] | None = DecoderFactory().decoder_for("cdr", schema)
+    if decode is None:
+        raise AssertionError("mcap_ros2 decodes every ros2msg schema")
+    return decode
+
+
+def read_transform(translation: Any, rotation: Any, name: str) -> FloatArray:
+    """(4, 4) of a decoded translation (x, y, z) and quaternion. Raises InvalidInputError, naming `name`."""
+    wxyz = np.array([rotation.w, rotation.x, rotation.y, rotation.z])
+    t_m = [translation.x, translation.y, translation.z]
+    if not (np.isfinite(wxyz).all() and np.isfinite(t_m).all()):
+        raise InvalidInputError(f"{name} contains NaN or infinity")
+    if abs(np.linalg.norm(wxyz) - 1) > 1e-3:
+        raise InvalidInputError(f"{name} has no unit quaternion: w, x, y, z = {wxyz.tolist()}")
+    return as_pose(from_quaternion_wxyz(wxyz, t_m), name)
+
+
+def read_pose(pose: Any, name: str) -> FloatArray:
+    """(4, 4) of a decoded geometry_msgs/Pose. Raises InvalidInputError, naming `name`."""
+    return read_transform(pose.position, pose.orientation, name)
+
+
+def read_static_transform(transforms: Iterable[Any]) -> FloatArray:
+    """T_base_cam (4, 4) among decoded TransformStamped messages. Raises InvalidInputError if missing."""
+    for stamped in transforms:
+        if (stamped.header.frame_id, stamped.child_frame_id) == (BASE_FRAME, CAMERA_FRAME):
+            return read_transform(stamped.transform.translation, stamped.transform.rotation, "T_base_cam")
+    raise InvalidInputError(f"{TF_STATIC} holds no transform {BASE_FRAME} -> {CAMERA_FRAME}")
+
+
+def read_camera(left_info: Any, right_info: Any) -> StereoCamera:
+    """The camera of two decoded sensor_msgs/CameraInfo. Raises InvalidInputError when they are no pair."""
+    P_left, P_right = (np.reshape(info.p, (3, 4)) for info in (left_info, right_info))
+    return StereoCamera.from_projections(P_left, P_right, (left_info.width, left_info.height))
+
+
+def read_depth(message: Any) -> FloatImage:
+    """Depth (H, W) float32 [m] of a decoded sensor_msgs/Image. Raises InvalidInputError when it is none."""
+    size = 4 * message.height * message.width
+    if message.encoding != "32FC1" or message.step != 4 * message.width or len(message.data) != size:
+        raise InvalidInputError(
+            f"depth must be 32FC1 of {size} bytes, not {message.encoding} of {len(message.data)}"
+        )
+    order = ">" if message.is_bigendian else "<"
+    depth = np.frombuffer(message.data, dtype=f"{order}f4").reshape(message.height, message.width)
+    return depth.astype(np.float32)

@@ -1,0 +1,72 @@
+"""The ROS 2 message definitions that a recording uses, as rosbag2 writes them (comments left out)."""
+
+_HEADER = "builtin_interfaces/Time stamp\nstring frame_id"
+_VECTOR3 = "float64 x\nfloat64 y\nfloat64 z"
+_QUATERNION = "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1"
+
+_PARTS = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
+    "std_msgs/Header": _HEADER,
+    "geometry_msgs/Point": _VECTOR3,
+    "geometry_msgs/Vector3": _VECTOR3,
+    "geometry_msgs/Quaternion": _QUATERNION,
+    "geometry_msgs/Pose": "Point position\nQuaternion orientation",
+    "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance",
+    "geometry_msgs/Twist": "Vector3 linear\nVector3 angular",
+    "geometry_msgs/TwistWithCovariance": "Twist twist\nfloat64[36] covariance",
+    "geometry_msgs/Transform": "Vector3 translation\nQuaternion rotation",
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform"
+    ),
+    "sensor_msgs/RegionOfInterest": (
+        "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify"
+    ),
+}
+
+_STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
+_POSE = ("geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion")
+
+
+def _schema(text: str, *parts: str) -> str:
+    rule = "=" * 80
+    return "\n".join([text, *(f"{rule}\nMSG: {part}\n{_PARTS[part]}" for part in parts)]) + "\n"
+
+
+SCHEMAS = {
+    "std_msgs/msg/Header": _schema(_HEADER, "builtin_interfaces/Time"),
+    "sensor_msgs/msg/CompressedImage": _schema(
+        "std_msgs/Header header\nstring format\nuint8[] data", *_STAMPED
+    ),
+    "sensor_msgs/msg/Image": _schema(
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
+        "uint8 is_bigendian\nuint32 step\nuint8[] data",
+        *_STAMPED,
+    ),
+    "sensor_msgs/msg/CameraInfo": _schema(
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\n"
+        "float64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n"
+        "uint32 binning_x\nuint32 binning_y\nRegionOfInterest roi",
+        *_STAMPED,
+        "sensor_msgs/RegionOfInterest",
+    ),
+    "nav_msgs/msg/Odometry": _schema(
+        "std_msgs/Header header\nstring child_frame_id\n"
+        "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist",
+        *_STAMPED,
+        "geometry_msgs/PoseWithCovariance",
+        *_POSE,
+        "geometry_msgs/TwistWithCovariance",
+        "geometry_msgs/Twist",
+        "geometry_msgs/Vector3",
+    ),
+    "geometry_msgs/msg/PoseStamped": _schema("std_msgs/Header header\nPose pose", *_STAMPED, *_POSE),
+    "tf2_msgs/msg/TFMessage": _schema(
+        "geometry_msgs/TransformStamped[] transforms",
+        "geometry_msgs/TransformStamped",
+        *_STAMPED,
+        "geometry_msgs/Transform",
+        "geometry_msgs/Vector3",
+        "geometry_msgs/Quaternion",
+    ),
+}
+"""Definition by full type name; std_msgs/Header is there to read any stamped message's first field alone."""

@@ -1,0 +1,97 @@
+"""Recordings seen in another way: with true poses, in part, or with their poses in disorder."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from ..errors import InvalidInputError, RecordingError
+from ..geometry import FloatArray, inverse
+from ..observation import Observation, Recording
+
+
+@runtime_checkable
+class _KnowsPoses(Protocol):
+    poses: FloatArray
+
+
+def poses(recording: Recording) -> FloatArray:
+    """The claimed T_world_cam (M, 4, 4) of all observations, without decoding images where that can be."""
+    if isinstance(recording, _KnowsPoses):
+        return recording.poses
+    return np.array([each.T_world_cam for each in recording]).reshape(-1, 4, 4)
+
+
+class TruePoses:
+    """A recording that claims its true poses: T_world_cam is the truth, T_odom_base agrees with it.
+
+    travelled_m and turned_rad stay as the odometry has them. Raises RecordingError when an observation
+    carries no truth; the first one is tried at once.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self.camera = recording.camera
+        self.T_base_cam = recording.T_base_cam
+        next(iter(self), None)
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[Observation]:
+        for each in self._recording:
+            if each.truth is None:
+                raise RecordingError(f"the observation at {each.stamp_s} s carries no true pose")
+            yield _with_pose(each, each.truth.T_world_cam, self.T_base_cam)
+
+
+class Subset:
+    """The observations start, start + stride, ... before stop of a recording, as a slice takes them.
+
+    Raises InvalidInputError unless 0 <= start, 0 <= stop and 1 <= stride.
+    """
+
+    def __init__(
+        self, recording: Recording, start: int = 0, stop: int | None = None, stride: int = 1
+    ) -> None:
+        if start < 0 or stride < 1 or (stop is not None and stop < 0):
+            raise InvalidInputError(
+                f"a subset needs start >= 0, stop >= 0 and stride >= 1, not {start}, {stop} and {stride}"
+            )
+        self._recording = recording
+        self._slice = slice(start, stop, stride)
+        self.camera = recording.camera
+        self.T_base_cam = recording.T_base_cam
+
+    def __len__(self) -> int:
+        return len(range(len(self._recording))[self._slice])
+
+    def __iter__(self) -> Iterator[Observation]:
+        return islice(iter(self._recording), self._slice.start, self._slice.stop, self._slice.step)
+
+
+class ShuffledPoses:
+    """A negative control: each observation claims the pose of another, by a permutation seeded with rng_seed.
+
+    Everything else, truth too, stays with its images; T_odom_base agrees with the claimed pose.
+    """
+
+    def __init__(self, recording: Recording, rng_seed: int) -> None:
+        self._recording = recording
+        self.camera = recording.camera
+        self.T_base_cam = recording.T_base_cam
+        self.poses: FloatArray = np.random.default_rng(rng_seed).permutation(poses(recording))
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[Observation]:
+        for each, T_world_cam in zip(self._recording, self.poses, strict=True):
+            yield _with_pose(each, T_world_cam, self.T_base_cam)
+
+
+def _with_pose(observation: Observation, T_world_cam: FloatArray, T_base_cam: FloatArray) -> Observation:
+    odometry = replace(observation.odometry, T_odom_base=T_world_cam @ inverse(T_base_cam))
+    return replace(observation, T_world_cam=T_world_cam, odometry=odometry)

@@ -1,0 +1,126 @@
+"""report.html: one self-contained file for a run, made from the files that stand in its folder."""
+
+import base64
+import html
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from .files import written_beside
+from .scoring import SCORE_NAMES, Score
+
+STYLE = """
+:root { color-scheme: light dark; --line: #8886; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
+table { border-collapse: collapse; margin: 1rem 0; } caption { text-align: left; font-weight: 600; }
+th, td { text-align: left; padding: .25rem .9rem .25rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+figure { margin: 1.5rem 0; break-inside: avoid; } figure img { max-width: 100%; background: white; }
+figcaption { font-size: .9rem; } pre { overflow-x: auto; padding: .8rem; border: 1px solid var(--line); }
+@media print { body { margin: 0; max-width: none; font-size: 11pt; } details > * { display: block; } }
+"""
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A picture (PNG file in the run folder) and what it shows."""
+
+    path: Path
+    caption: str
+
+
+def write_report(
+    folder: Path,
+    title: str,
+    *,
+    summary: str,
+    arms: Mapping[str, Sequence[Score]],
+    figures: Sequence[ReportFigure],
+    facts: Mapping[str, str],
+) -> Path:
+    """Write folder/report.html with the figures inside it.
+
+    arms: scores of each arm of the experiment, by the arm's name. facts: what was run (command, seed, ...);
+    versions and the machine are added. config.toml is quoted where it stands in the folder.
+    """
+    config = folder / "config.toml"
+    parts = [
+        f"<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>",
+        score_table(arms),
+        *(_figure(figure) for figure in figures),
+        _facts({**facts, **environment()}),
+    ]
+    if config.exists():
+        text = html.escape(config.read_text(encoding="utf-8"))
+        parts.append(f"<details><summary>config.toml</summary><pre>{text}</pre></details>")
+    body = "\n".join(parts)
+    page = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        f'<meta name="viewport" content="width=device-width"><title>{html.escape(title)}</title>'
+        f"<style>{STYLE}</style></head><body>{body}</body></html>"
+    )
+    path = folder / "report.html"
+    with written_beside(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return path
+
+
+def score_table(arms: Mapping[str, Sequence[Score]]) -> str:
+    """The scores as an HTML table: a row a score, a column an arm, the unit and the meaning beside them."""
+    names = list(dict.fromkeys(score.name for scores in arms.values() for score in scores))
+    by_arm = {arm: {score.name: score for score in scores} for arm, scores in arms.items()}
+    head = "".join(f"<th>{html.escape(arm)}</th>" for arm in arms)
+    rows = []
+    for name in names:
+        cells = "".join(f'<td class="number">{format_score(row.get(name))}</td>' for row in by_arm.values())
+        meaning = html.escape(SCORE_NAMES[name][1]) if name in SCORE_NAMES else ""
+        rows.append(f"<tr><td>{html.escape(name)}</td>{cells}<td>{meaning}</td></tr>")
+    return f"<table><caption>Scores</caption><tr><th>score</th>{head}<th>meaning</th></tr>{''.join(rows)}</table>"
+
+
+def format_score(score: Score | None) -> str:
+    """Three significant digits and the unit; a dash where there is no number."""
+    if score is None or score.value != score.value:
+        return "&ndash;"
+    return f"{score.value:.3g}" + ("" if score.unit == "1" else f" {html.escape(score.unit)}")
+
+
+def environment() -> dict[str, str]:
+    """Versions of what the numbers depend on, and the kind of machine."""
+    packages = ("stereogrid", "numpy", "numba", "opencv-python-headless", "trimesh", "embreex", "pybullet")
+    versions = {name: _version(name) for name in packages}
+    return {
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items() if version),
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def write_metrics(folder: Path, metrics: Mapping[str, object]) -> Path:
+    """Write folder/metrics.json; NaN must already be null (scores_to_dict sees to that)."""
+    path = folder / "metrics.json"
+    with written_beside(path) as temporary:
+        temporary.write_text(json.dumps(metrics, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _figure(figure: ReportFigure) -> str:
+    picture = base64.b64encode(figure.path.read_bytes()).decode()
+    caption = html.escape(figure.caption)
+    image = f'<img alt="{caption}" src="data:image/png;base64,{picture}">'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+
+
+def _facts(facts: Mapping[str, str]) -> str:
+    rows = "".join(f"<tr><th>{html.escape(k)}</th><td>{html.escape(v)}</td></tr>" for k, v in facts.items())
+    return f"<table><caption>What was run</caption>{rows}</table>"

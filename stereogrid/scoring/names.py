@@ -1,0 +1,64 @@
+"""Every name that `score_map` gives, with its unit and meaning: one table for reports and readers.
+
+Cells: all but INTERIOR ones, which nothing can see. A name without a suffix is taken over the cells that are
+visible and that the map has touched; `_all` over all of V, an unknown cell counting as the prior, so that
+abstaining does not win; `_tolerant` leaves out FREE cells within tau = max(cell, 2 dl at the nearest view) of
+an OCCUPIED one, dl from Eq. 8. `floor_` is the same score of the voxelised mesh itself: no map can do better.
+"""
+
+from .score import DIMENSIONLESS
+
+COVERAGE = {
+    "coverage": (DIMENSIONLESS, "share of V that the map has touched"),
+    "coverage_occupied": (DIMENSIONLESS, "the same among OCCUPIED cells"),
+    "coverage_free": (DIMENSIONLESS, "the same among FREE cells"),
+}
+RANKING = {
+    "auc": (DIMENSIONLESS, "chance that an OCCUPIED cell has a higher p than a FREE one, ties counted half"),
+    "average_precision": (DIMENSIONLESS, "precision averaged over recall"),
+    "occupied_precision": (DIMENSIONLESS, "share OCCUPIED among the cells at p > .5"),
+    "occupied_recall": (DIMENSIONLESS, "share at p > .5 among the OCCUPIED cells"),
+    "occupied_f1": (DIMENSIONLESS, "harmonic mean of occupied precision and recall"),
+    "occupied_iou": (DIMENSIONLESS, "cells both OCCUPIED and at p > .5, over cells either"),
+    "cell_accuracy": (DIMENSIONLESS, "share of right cells; a footnote: most are free, so it misranks maps"),
+}
+CALIBRATION = {
+    "brier": (DIMENSIONLESS, "mean squared error of p"),
+    "brier_balanced": (DIMENSIONLESS, "the same, mean of the two classes; .25 for p = .5"),
+    "log_loss": ("nat", "mean negative log-likelihood, p clipped to [1e-6, 1 - 1e-6]"),
+    "log_loss_balanced": ("nat", "the same, mean of the two classes"),
+    "ece_width": (DIMENSIONLESS, "expected calibration error in 10 bins of equal width"),
+    "ece_count": (DIMENSIONLESS, "expected calibration error in 10 bins of equal count, fewer where p ties"),
+}
+OTHERS = {
+    "unsafe_occupied": (DIMENSIONLESS, "share of the OCCUPIED cells of V at p < .2; unknown is the prior"),
+    "entropy": ("bit", "mean entropy of a cell of V; never alone: an overconfident wrong map scores best"),
+}
+SURFACE = {
+    "accuracy_m": ("m", "mean distance of the map's occupied centres to the mesh"),
+    "accuracy_p95_m": ("m", "its 95th percentile"),
+    "completeness_m": ("m", "mean distance of the visible mesh to the map's occupied centres"),
+    "completeness_p95_m": ("m", "its 95th percentile"),
+    "chamfer_m": ("m", "half the sum of accuracy_m and completeness_m"),
+    "surface_f1_1_cell": (DIMENSIONLESS, "F of both shares within one cell side"),
+    "surface_f1_2_cells": (DIMENSIONLESS, "F within two cell sides"),
+    "surface_f1_5_cm": (DIMENSIONLESS, "F within 5 cm"),
+    "surface_f1_10_cm": (DIMENSIONLESS, "F within 10 cm"),
+    "surface_f1_20_cm": (DIMENSIONLESS, "F within 20 cm"),
+}
+WHERE = {
+    "": "touched cells of V",
+    "_all": "all of V, unknown = prior",
+    "_tolerant": "touched cells of V, FREE ones near the surface left out",
+    "_all_tolerant": "all of V, unknown = prior, FREE cells near the surface left out",
+}
+
+SCORE_NAMES: dict[str, tuple[str, str]] = {
+    **COVERAGE,
+    **{f"{n}{end}": (u, f"{m} ({where})") for end, where in WHERE.items() for n, (u, m) in RANKING.items()},
+    **{f"{n}{end}": (u, f"{m} ({WHERE[end]})") for end in ("", "_all") for n, (u, m) in CALIBRATION.items()},
+    **OTHERS,
+    **SURFACE,
+    **{f"floor_{n}": (u, f"{m}, of the voxelised mesh") for n, (u, m) in SURFACE.items()},
+}
+"""name -> (unit, meaning)."""

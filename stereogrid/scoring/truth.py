@@ -1,0 +1,95 @@
+"""What a map of a drive is scored against: labels and visible set of one recording's true mesh and poses."""
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+import numpy as np
+
+from ..camera import StereoCamera
+from ..errors import RecordingError
+from ..geometry import FloatArray
+from .calibration import ReliabilityTable
+from .labels import CellLabels, label_cells
+from .map_scores import SIGMA_PX, ScoredMap, map_reliability, score_map
+from .score import Score
+from .visibility import VisibleSet, visible_cells
+
+if TYPE_CHECKING:
+    import trimesh
+
+
+@runtime_checkable
+class KnowsTruth(Protocol):
+    """A recording that carries the true poses and the true mesh, as simulated ones do."""
+
+    camera: StereoCamera
+
+    def true_poses(self) -> FloatArray | None:
+        """T_world_cam (M, 4, 4), NaN rows where unknown; None when there are none."""
+        ...
+
+    def truth_mesh_ply(self) -> bytes | None:
+        """The true mesh as a PLY file; None when there is none."""
+        ...
+
+
+@dataclass(frozen=True)
+class MapTruth:
+    """One visible set for every map of the same drive, so that their scores compare."""
+
+    mesh: "trimesh.Trimesh"
+    camera: StereoCamera
+    labels: CellLabels
+    visible: VisibleSet
+
+    @classmethod
+    def of_recording(
+        cls,
+        recording: object,
+        cell_m: float,
+        *,
+        max_range_m: float,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> "MapTruth":
+        """Labels of cells of cell_m and the set seen within max_range_m. RecordingError without a truth."""
+        mesh_ply = recording.truth_mesh_ply() if isinstance(recording, KnowsTruth) else None
+        poses = recording.true_poses() if isinstance(recording, KnowsTruth) else None
+        if mesh_ply is None or poses is None or not isinstance(recording, KnowsTruth):
+            raise RecordingError("the recording carries no true mesh and poses, so there is nothing to score against")
+        mesh = load_ply(mesh_ply)
+        known = poses[~np.isnan(poses).any(axis=(1, 2))]
+        labels = label_cells(mesh, cell_m)
+        visible = visible_cells(labels, mesh, recording.camera, known, max_range_m=max_range_m, progress=progress)
+        return cls(mesh, recording.camera, labels, visible)
+
+    def score(self, grid: ScoredMap, *, prior: float = 0.5, sigma_px: float = SIGMA_PX) -> list[Score]:
+        """Every score of SCORE_NAMES of a map of this drive; arguments as in score_map."""
+        return score_map(
+            grid, self.labels, self.visible, prior=prior, mesh=self.mesh, camera=self.camera, sigma_px=sigma_px
+        )
+
+    def reliability(self, grid: ScoredMap) -> ReliabilityTable:
+        """The reliability diagram of a map of this drive, 10 bins of equal width."""
+        return map_reliability(grid, self.labels, self.visible)
+
+    def section_m(self, height_m: float) -> FloatArray:
+        """Segments (S, 2, 3) in which the true mesh meets the plane z = height_m [m]."""
+        from trimesh.intersections import mesh_plane
+
+        segments: FloatArray = np.asarray(mesh_plane(self.mesh, [0.0, 0.0, 1.0], [0.0, 0.0, height_m]))
+        return segments.reshape(-1, 2, 3)
+
+
+def load_ply(ply: bytes) -> "trimesh.Trimesh":
+    """A mesh from the bytes of a PLY file. Raises RecordingError when they are not one."""
+    import trimesh
+
+    try:
+        mesh = trimesh.load(io.BytesIO(ply), file_type="ply", process=False)
+    except (ValueError, IndexError, KeyError, TypeError) as error:
+        raise RecordingError(f"the true mesh cannot be read: {error}") from None
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise RecordingError("the true mesh holds no triangles")
+    return mesh

@@ -1,0 +1,141 @@
+"""The inverse sensor model: what one disparity says about the cells on its ray. Eqs. 2, 3 and 8 to 13.
+
+Corrected where the paper's print cannot be right; `as_printed.py` keeps the literal forms, docs/method.md
+shows the two side by side.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr
+
+from .camera import StereoCamera
+from .errors import InvalidInputError, unknown_name
+from .geometry import FloatArray, as_floats
+
+FORMS = ("corrected", "printed")
+MOTION_RULES = ("rss", "linear")
+REACH_SIGMAS = 3.5
+"""Further than this before the measured surface a cell is plainly free; as far behind it nothing is learnt."""
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """Parameters of Eqs. 3, 11, 12 and 13.
+
+    p_free, p_occupied: what one reading claims at most (p_min and p_max). prior: p0 of Eq. 3.
+    max_range_m: depths beyond it are not used. form: "corrected" or "printed" (Eqs. 3 and 11 as in the paper).
+    motion: how eps joins the stereo error in Eq. 13, "rss" (independent errors, the default) or "linear"
+    (the paper's sum, a worst-case bound).
+    """
+
+    p_free: float = 0.3
+    p_occupied: float = 0.9
+    prior: float = 0.5
+    max_range_m: float = 8.0
+    form: str = "corrected"
+    motion: str = "rss"
+
+    def __post_init__(self) -> None:
+        if not 0 < self.p_free < self.prior < self.p_occupied < 1:
+            raise InvalidInputError(
+                "expected 0 < p_free < prior < p_occupied < 1, not "
+                f"p_free {self.p_free}, prior {self.prior}, p_occupied {self.p_occupied}"
+            )
+        if not (np.isfinite(self.max_range_m) and self.max_range_m > 0):
+            raise InvalidInputError(f"max_range_m must be positive and finite, not {self.max_range_m}")
+        if self.form not in FORMS:
+            raise unknown_name("form of the sensor model", self.form, FORMS)
+        if self.motion not in MOTION_RULES:
+            raise unknown_name("motion rule", self.motion, MOTION_RULES)
+
+
+def log_odds(probability: ArrayLike) -> FloatArray:
+    """logit(p) = log(p / (1 - p)), any shape."""
+    p = as_floats(probability)
+    logit: FloatArray = np.log(p) - np.log1p(-p)
+    return logit
+
+
+def probability(log_odds: ArrayLike) -> FloatArray:
+    """p = 1 - 1 / (1 + e^l), any shape. Eq. 2 with its sign corrected; written so that e^l cannot overflow."""
+    p: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * as_floats(log_odds)))
+    return p
+
+
+def fuse(log_odds_before: ArrayLike, p_reading: ArrayLike, prior: float) -> FloatArray:
+    """l_t = l_{t-1} + logit p - logit p0. Eq. 3 with its sign corrected: p = p0 changes nothing."""
+    return as_floats(log_odds_before) + log_odds(p_reading) - log_odds(prior)
+
+
+def depth_sigma_m(camera: StereoCamera, depth_m: ArrayLike, sigma_px: ArrayLike) -> FloatArray:
+    """dz = z^2 dd / (b f) [m], any shape. Eq. 8, first order: use depth_interval_m where dd / d > 0.2."""
+    sigma: FloatArray = np.square(as_floats(depth_m)) * as_floats(sigma_px) / camera.focal_baseline_px_m
+    return sigma
+
+
+def depth_interval_m(
+    camera: StereoCamera, disparity_px: ArrayLike, sigma_px: ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """The exact, skewed interval f b / (d +- dd) [m]; its far end is infinite where dd >= d."""
+    d = as_floats(disparity_px)
+    sigma = as_floats(sigma_px)
+    with np.errstate(divide="ignore"):
+        far = np.where(sigma < d, camera.focal_baseline_px_m / np.maximum(d - sigma, 0.0), np.inf)
+    return camera.depth_m(d + sigma), far
+
+
+def range_and_sigma_m(points_cam: ArrayLike, depth_sigma_m: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """l_p = norm(P_c) and dl_p = dz l_p / z [m] of points (N, 3) in cam. Eqs. 9 and 10."""
+    points = as_floats(points_cam)
+    range_m: FloatArray = np.linalg.norm(points, axis=-1)
+    sigma: FloatArray = as_floats(depth_sigma_m) * range_m / points[..., 2]
+    return range_m, sigma
+
+
+def widened_sigma_px(
+    camera: StereoCamera, disparity_px: ArrayLike, sigma_px: ArrayLike, *, motion_sigma_m: float, motion: str = "rss"
+) -> FloatArray:
+    """The disparity sigma that carries eps of Eq. 13 as well [px], any shape.
+
+    dz = z^2 dd / (b f) + eps is, in disparity space, dd + eps d^2 / (b f): one number a pixel. "linear" adds
+    the two as the paper does, "rss" as independent errors add.
+    """
+    eps_px = motion_sigma_m * np.square(as_floats(disparity_px)) / camera.focal_baseline_px_m
+    if motion == "linear":
+        return as_floats(sigma_px) + eps_px
+    widened: FloatArray = np.hypot(sigma_px, eps_px)
+    return widened
+
+
+def occupancy_probability(
+    range_m: ArrayLike, measured_range_m: ArrayLike, sigma_m: ArrayLike, *, cell_m: float, model: SensorModel
+) -> FloatArray:
+    """p(occupied) of a cell of cell_m whose centre lies at range_m on the ray of one reading. Eqs. 11 and 12.
+
+    With u = (l - l_p) / dl and h = cell / (2 dl):
+      hit = Phi(u + h) - Phi(u - h)      the probability that the surface lies in the cell, never above 1
+      w = exp(-max(|u| - h, 0)^2 / 2)    Eq. 12's weight, taken at the point of the cell nearest to l_p
+      p = (1 - w) p_side + w (p0 + (p_occupied - p0) hit),   p_side = p_free in front, p0 behind.
+    Arguments broadcast; in (0, 1) for every range, sigma and cell size.
+    """
+    sigma = as_floats(sigma_m)
+    u = (as_floats(range_m) - as_floats(measured_range_m)) / sigma
+    half = 0.5 * cell_m / sigma
+    hit = ndtr(u + half) - ndtr(u - half)
+    weight = np.exp(-0.5 * np.square(np.maximum(np.abs(u) - half, 0.0)))
+    side = np.where(u < 0, model.p_free, model.prior)
+    p: FloatArray = (1 - weight) * side + weight * (model.prior + (model.p_occupied - model.prior) * hit)
+    return p
+
+
+def kernel_parameters(model: SensorModel) -> tuple[float, float, float, bool]:
+    """(p_free, p_occupied, prior, printed): the model as the Numba kernels take it."""
+    return model.p_free, model.p_occupied, model.prior, model.form == "printed"
+
+
+def free_log_odds(model: SensorModel) -> float:
+    """What a cell well in front of the measured surface gains: logit p_free - logit p0."""
+    return math.log(model.p_free / (1 - model.p_free)) - math.log(model.prior / (1 - model.prior))

@@ -1,0 +1,149 @@
+"""The robot: its odometry errs as a P3-AT's does, and a drive is the same every time."""
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pybullet")
+pytest.importorskip("embreex")
+
+from sim.follower import PathFollower
+from sim.noise import IMAGE_NOISE, NoisyImages
+from sim.odometry import EFFECTIVE_TRACK_M, WheelOdometry
+from sim.pioneer import TICK_S, Pioneer, SimulationError
+from sim.record import record_drive
+from sim.rig import StereoRig
+from sim.scene import World
+from sim.solids import Paint, box
+from sim.source import Drive
+from sim.textures import Texture
+from sim.world import make_world
+from stereogrid.camera import StereoCamera
+from stereogrid.errors import InvalidInputError, StereogridError
+from stereogrid.geometry import yaw_rad
+from stereogrid.observation import Observation, Recording, Source
+from stereogrid.recording.mcap import McapRecording
+
+TRACK_M = 0.40
+SMALL = StereoRig(StereoCamera(208.5, 79.5, 59.5, 0.06, 160, 120))
+
+
+@pytest.fixture(scope="module")
+def corridor() -> World:
+    return make_world("corridor", 0)
+
+
+def run(speed_mps: float, turn_radps: float, duration_s: float) -> tuple[float, float, WheelOdometry]:
+    """True path length [m], true turn [rad], and the odometry of a drive that starts gently."""
+    with Pioneer() as robot:
+        length_m, turned, last = 0.0, 0.0, robot.T_world_base
+        for tick in range(int(duration_s / TICK_S)):
+            share = min(1.0, tick * TICK_S)
+            robot.drive(share * speed_mps, share * turn_radps)
+            now = robot.T_world_base
+            length_m += float(np.linalg.norm(now[:2, 3] - last[:2, 3]))
+            turned += float(np.angle(np.exp(1j * (yaw_rad(now) - yaw_rad(last)))))
+            last = now
+    return length_m, turned, robot.odometry
+
+
+def test_odometry_of_a_straight_drive_is_right_to_a_thousandth() -> None:
+    length_m, turned, odometry = run(0.4, 0.0, 10.0)
+    assert length_m / odometry.travelled_m == pytest.approx(1.0, abs=1e-3)
+    assert abs(turned) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "turn_radps"), [(0.0, 0.3), (0.0, 0.8), (0.0, -0.8), (0.325, 0.255), (0.4, 0.4), (0.4, 0.2)]
+)
+def test_wheels_turn_as_if_they_stood_half_as_far_apart_again(speed_mps: float, turn_radps: float) -> None:
+    _, turned, odometry = run(speed_mps, turn_radps, 8.0)
+    geometric_turn = odometry.turned_rad * EFFECTIVE_TRACK_M / TRACK_M
+    assert 1.4 <= geometric_turn / abs(turned) <= 1.6
+
+
+def test_wheel_odometry_follows_an_arc_exactly() -> None:
+    odometry = WheelOdometry()
+    for _ in range(10):
+        odometry.update(1.0, 2.0)
+    turned = 10 * 0.11 / 0.588
+    radius = 10 * 1.5 * 0.11 / turned
+    expected = [radius * np.sin(turned), radius * (1 - np.cos(turned)), 0.0]
+    assert odometry.T_odom_base[:3, 3] == pytest.approx(expected)
+    assert odometry.turned_rad == pytest.approx(turned)
+
+
+def test_a_drive_is_the_same_every_time_and_with_any_number_of_threads(corridor: World) -> None:
+    one, again, three = (digest(Drive(corridor, SMALL, max_distance_m=2.0, workers=workers)) for workers in (1, 1, 3))
+    assert one == again == three
+
+
+def test_the_robot_drives_the_whole_path_and_sees_all_of_it(corridor: World) -> None:
+    drive = Drive(corridor, SMALL)
+    moments = list(drive.moments())
+    places = np.array([m.T_world_base[:2, 3] for m in moments])
+    assert np.linalg.norm(places[-1] - corridor.waypoints_m[-1]) < 0.3
+    gaps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    turns = np.abs(np.diff(np.unwrap([yaw_rad(m.T_world_base) for m in moments])))
+    assert gaps.max() < 0.21 and turns.max() < 0.15
+    assert 150 <= len(moments) <= drive.most_observations <= 1.2 * len(moments)
+    off = np.minimum(np.abs(places[:, 1]), np.abs(places[:, 0] - corridor.waypoints_m[-1][0]))
+    assert off.max() < 0.3
+
+
+def test_a_drive_is_a_source_whose_claims_start_at_the_truth(corridor: World) -> None:
+    drive = Drive(corridor, SMALL, max_distance_m=0.5)
+    assert isinstance(drive, Source) and not isinstance(drive, Recording)
+    first = next(iter(drive))
+    assert first.truth is not None and first.truth.depth_m is not None
+    assert first.truth.T_world_cam == pytest.approx(first.T_world_cam, abs=3e-3)
+    assert np.isfinite(first.truth.depth_m).mean() > 0.999
+
+
+def test_a_wall_across_the_path_stops_the_drive_with_a_message() -> None:
+    texture = Texture(np.full((2, 2), 128, np.uint8))
+    wall = box("wall", (1.0, -1.0, 0.0), (1.2, 1.0, 1.0), Paint("plain"))
+    world = World("blocked", 0, (wall,), {"plain": texture}, (), np.array([[0.0, 0.0], [3.0, 0.0]]))
+    with pytest.raises(SimulationError, match="stuck at x = 0"):
+        list(Drive(world, SMALL).moments())
+
+
+def test_a_speed_beyond_the_robots_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="speed_mps"):
+        PathFollower(np.array([[0.0, 0.0], [1.0, 0.0]]), speed_mps=0.9)
+
+
+def test_a_recording_gives_back_the_drive_and_the_same_bytes(corridor: World, tmp_path: Path) -> None:
+    shares: list[float] = []
+    options = {"world": "corridor", "rig": SMALL, "max_distance_m": 1.0}
+    paths = [record_drive(tmp_path / f"{k}.mcap", progress=shares.append, **options) for k in range(2)]  # type: ignore[arg-type]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    recording = McapRecording(paths[0])
+    assert digest(recording) == digest(Drive(corridor, SMALL, max_distance_m=1.0))
+    assert recording.metadata["world"] == "corridor" and recording.truth_mesh_ply() is not None
+    assert shares[len(shares) // 2 - 1] > 0.8 and all(0 <= s <= 1 for s in shares)
+    assert len(NoisyImages(recording, IMAGE_NOISE["mild"], seed=0)) == len(recording)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"world": "maze"}, {"every_m": 0.0}, {"every_m": np.nan}, {"max_distance_m": -1.0}, {"seed": -1}]
+)
+def test_bad_arguments_leave_no_file(wrong: dict[str, object], tmp_path: Path) -> None:
+    with pytest.raises(StereogridError):
+        record_drive(tmp_path / "drive.mcap", **wrong)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def digest(observations: Iterable[Observation]) -> str:
+    """A hash of all that a drive says. Stamps are taken to the nanosecond that a file keeps."""
+    sha = hashlib.sha256()
+    for o in observations:
+        assert o.truth is not None and o.truth.depth_m is not None
+        poses = np.round([o.odometry.T_odom_base, o.truth.T_world_cam], 9) + 0.0
+        for part in (o.left, o.right, o.truth.depth_m, poses):
+            sha.update(np.ascontiguousarray(part).tobytes())
+        sha.update(f"{round(o.stamp_s * 1e9)}".encode())
+    return sha.hexdigest()
