@@ -1,22 +1,25 @@
 """The main experiment: drive down a corridor, map it, and compare the map with the truth.
 
 Arms, all of the same drive: a perfect rig with true poses; the default camera and odometry noise; and the
-controls: true depth (the ceiling: what the grid could do with perfect matching) and shuffled poses (no map).
+controls: true depth (the ceiling: what the grid could do with perfect matching) and shuffled poses, whose map
+must be no better than chance away from the floor and the ceiling.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sim.noise import NoisyImages, image_noise
 from sim.record import record_drive
+from sim.rig import MINORU
+from stereogrid.camera import StereoCamera
 from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, save_config
+from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.figures import reliability_figure, save_figure
-from stereogrid.mapping_run import Mapped, build_map, draw_map
+from stereogrid.mapping_run import Mapped, Track, build_map, draw_map
 from stereogrid.motion import MotionError, NoisyOdometry, OdometryNoise
 from stereogrid.observation import Disparity, Observation, Recording
 from stereogrid.recording import ShuffledPoses, TruePoses, open_recording
@@ -26,7 +29,7 @@ from stereogrid.scoring import Score, scores_to_dict
 from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import SensorModel
 
-from .parallel import Stage, in_parallel
+from .parallel import Stage, counted, in_parallel
 
 IDEAL, NOISY, TRUE_DEPTH, SHUFFLED = "ideal", "noisy", "true depth", "shuffled poses"
 HEADLINE = (
@@ -34,6 +37,8 @@ HEADLINE = (
     "occupied_precision",
     "occupied_recall",
     "occupied_f1",
+    "obstacle_auc",
+    "obstacle_occupied_f1",
     "coverage_occupied",
     "brier_balanced",
     "log_loss",
@@ -42,6 +47,11 @@ HEADLINE = (
     "completeness_m",
 )
 """What the table on the screen shows of the scores in metrics.json."""
+OBSTACLES_M = (0.15, 2.4)
+"""Heights between the floor and the ceiling of the corridor [m]."""
+OBSTACLE_SCORES = ("auc", "occupied_precision", "occupied_recall", "occupied_f1")
+TRUE_SIGMA_PX = 0.05
+"""Of the true disparity: small against any matcher's, large enough that the sensor model stays smooth."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,7 @@ class CorridorConfig:
 
     seed: int = 0
     noise_seed: int = 1
-    every_m: float = 0.2
+    every_m: float = 0.25
     distance_m: float = 0.0
     score_range_m: float = 5.0
     image_noise: str = "mild"
@@ -73,6 +83,16 @@ class CorridorConfig:
     )
     motion_error: MotionError = field(default_factory=lambda: MotionError(a_m=1e-5))
 
+    def __post_init__(self) -> None:
+        image_noise(self.image_noise)
+        self.mapping.build_mapper(MINORU)
+        for name in ("every_m", "score_range_m"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidInputError(f"{name} must be positive and finite, not {getattr(self, name)}")
+        for name in ("seed", "noise_seed", "distance_m"):
+            if not getattr(self, name) >= 0:
+                raise InvalidInputError(f"{name} must be >= 0, not {getattr(self, name)}")
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -86,14 +106,18 @@ class Outcome:
         return next(score.value for score in self.scores if score.name == name)
 
 
-def run(config: CorridorConfig, stage: Stage, *, runs: Path, command: str, recording: Path | None) -> tuple[Path, Any]:
+def run(
+    config: CorridorConfig, stage: Stage, *, runs: Path, command: str = "", recording: Path | None = None
+) -> tuple[Path, dict[str, Outcome]]:
     """Record (or reuse) the drive, map it in every arm, score, draw, report; the run folder and the outcomes."""
+    reused = open_recording(recording) if recording else None
     with run_folder(runs, "corridor") as folder:
-        drive = open_recording(recording or record(config, folder / "drive.mcap", stage))
-        outcomes = score_arms(drive, config, stage)
-        with stage("drawing", 1) as step:
-            write_results(folder, drive, outcomes, config=config, command=command)
-            step()
+        save_config(config, folder / "config.toml")
+        drive = reused or open_recording(record(config, folder / "drive.mcap", stage))
+        truth, outcomes = score_arms(drive, config, stage)
+        with stage("drawing", 1):
+            facts = {"command": command, "recording": str(recording or "drive.mcap"), "pairs": str(len(drive))}
+            write_results(folder, drive, truth, outcomes, facts)
     return finished_path(folder), outcomes
 
 
@@ -110,45 +134,85 @@ def record(config: CorridorConfig, path: Path, stage: Stage) -> Path:
         )
 
 
-def arms(drive: Recording, config: CorridorConfig) -> dict[str, Callable[[], Mapped]]:
+def arms(drive: Recording, config: CorridorConfig, track: Track) -> dict[str, Callable[[], Mapped]]:
     """How each arm makes its map; all read the same drive."""
     noisy = NoisyImages(
         NoisyOdometry(drive, config.odometry_noise, config.noise_seed),
         image_noise(config.image_noise),
         config.noise_seed,
     )
-    perfect = config.mapping
-    moving = MappingConfig(perfect.matcher, perfect.model, config.motion_error, perfect.grid)
+    true, shuffled = TruePoses(drive), ShuffledPoses(TruePoses(drive), config.noise_seed)
+    perfect = partial(build_map, config=config.mapping, track=track)
+    moving = replace(config.mapping, motion_error=config.motion_error)
     return {
-        IDEAL: partial(build_map, TruePoses(drive), perfect),
-        NOISY: partial(build_map, noisy, moving),
-        TRUE_DEPTH: partial(build_map, TruePoses(drive), perfect, disparity_of=partial(true_disparity, drive)),
-        SHUFFLED: partial(build_map, ShuffledPoses(TruePoses(drive), config.noise_seed), perfect),
+        IDEAL: partial(perfect, true),
+        NOISY: partial(build_map, noisy, moving, track),
+        TRUE_DEPTH: partial(perfect, true, disparity_of=partial(true_disparity, drive.camera)),
+        SHUFFLED: partial(perfect, shuffled),
     }
 
 
-def true_disparity(drive: Recording, observation: Observation) -> Disparity:
-    """The disparity of the true depth, exact to TRUE_SIGMA_PX."""
-    assert observation.truth is not None and observation.truth.depth_m is not None
-    disparity_px = drive.camera.disparity_px(observation.truth.depth_m).astype(np.float32)
+def true_disparity(camera: StereoCamera, observation: Observation) -> Disparity:
+    """The disparity of the true depth (H, W)."""
+    if observation.truth is None or observation.truth.depth_m is None:
+        raise RecordingError("the recording carries no true depth, so the ceiling cannot be mapped")
+    disparity_px = camera.disparity_px(observation.truth.depth_m).astype(np.float32)
     return Disparity(disparity_px, np.full_like(disparity_px, TRUE_SIGMA_PX))
 
 
-TRUE_SIGMA_PX = 0.05
-"""Small against any matcher's, large enough that the sensor model stays smooth."""
-
-
-def score_arms(drive: Recording, config: CorridorConfig, stage: Stage) -> dict[str, Outcome]:
+def score_arms(drive: Recording, config: CorridorConfig, stage: Stage) -> tuple[MapTruth, dict[str, Outcome]]:
     """Map the drive in every arm and score the maps against one visible set."""
-    jobs: dict[str, Callable[[], Any]] = {
-        "truth": partial(
-            MapTruth.of_recording, drive, config.mapping.grid.cell_m, max_range_m=config.score_range_m
-        ),
-        **arms(drive, config),
-    }
-    with stage("mapping", len(jobs)) as step:
-        results = in_parallel(jobs, step)
+    with stage("mapping", 5 * len(drive)) as step:
+        truth_of_drive = partial(
+            MapTruth.of_recording,
+            drive,
+            config.mapping.grid.cell_m,
+            max_range_m=config.score_range_m,
+            progress=lambda _done, _total: step(),
+        )
+        results = in_parallel({"truth": truth_of_drive, **arms(drive, config, counted(step))})
     truth: MapTruth = results.pop("truth")
+    obstacles = truth.between(*OBSTACLES_M)
     with stage("scoring", len(results)) as step:
-        scores = in_parallel({name: partial(truth.score, mapped.grid) for name, mapped in results.items()}, step)
-    return {name: Outcome(mapped, scores[name]) for name, mapped in results.items()}
+        jobs = {name: partial(score, truth, obstacles, mapped) for name, mapped in results.items()}
+        scores = in_parallel(jobs, step)
+    return truth, {name: Outcome(mapped, scores[name]) for name, mapped in results.items()}
+
+
+def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
+    """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
+    among = obstacles.score(mapped.grid, surface=False)
+    named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
+    return [*truth.score(mapped.grid), *named]
+
+
+def write_results(
+    folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome], facts: Mapping[str, str]
+) -> None:
+    """Maps, metrics, figures and the report of the run, into its folder."""
+    for name, outcome in outcomes.items():
+        outcome.mapped.grid.save(folder / f"map-{name.replace(' ', '-')}.sgrid")
+    low, high = OBSTACLES_M
+    write_metrics(folder, {"facts": facts, "arms": {n: scores_to_dict(o.scores) for n, o in outcomes.items()}})
+    write_report(
+        folder,
+        "The corridor experiment",
+        summary="A simulated drive down a corridor, mapped by stereo and scored against the true mesh, on the cells "
+        "that the cameras could see.",
+        arms={name: outcome.scores for name, outcome in outcomes.items()},
+        figures=draw(folder, drive, truth, outcomes),
+        facts=facts,
+        headline=HEADLINE,
+        meanings={f"obstacle_{name}": f"{name} of the cells from {low} to {high} m" for name in OBSTACLE_SCORES},
+    )
+
+
+def draw(folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome]) -> list[ReportFigure]:
+    """The figures of the main arm, and its reliability beside the noisy one's."""
+    main = outcomes[IDEAL].mapped
+    figures = draw_map(main, drive, folder, truth_segments_m=truth.section_m(float(np.median(main.path_m[:, 2]))))
+    for name in (IDEAL, NOISY):
+        figure = reliability_figure(truth.reliability(outcomes[name].mapped.grid), title=f"Reliability, {name}")
+        path = save_figure(figure, folder / f"reliability-{name}.png")
+        figures.append(ReportFigure(path, f"Are the probabilities of the {name} arm frequencies?"))
+    return figures

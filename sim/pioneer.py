@@ -16,9 +16,9 @@ from .scene import World
 
 URDF = Path(__file__).parent / "assets" / "pioneer3at.urdf"
 STEP_S = 1 / 240
-STEPS_A_TICK = 4
+STEPS_A_TICK = 8
 TICK_S = STEPS_A_TICK * STEP_S
-"""The wheels' controller and the encoders run at 60 Hz."""
+"""The wheels' controller and the encoders run at 30 Hz."""
 MOTOR_TORQUE_NM = 12.0
 WHEEL_FRICTION: dict[str, Any] = {
     "lateralFriction": 0.8,
@@ -41,6 +41,7 @@ class SimulationError(StereogridError):
 class Pioneer:
     """A robot at rest at the origin of a world (or of an empty plane), heading +x. Use as a context manager.
 
+    T_world_base (4, 4) is its true pose, odometry what it believes, time_s since the start.
     Rebuilding it gives the same motion bit for bit; there is no reset.
     """
 
@@ -54,6 +55,7 @@ class Pioneer:
             self.close()
             raise
         self._encoders_rad = self.encoders_rad()
+        self.T_world_base = self._pose()
 
     def __enter__(self) -> "Pioneer":
         return self
@@ -68,14 +70,6 @@ class Pioneer:
         if self._client >= 0:
             pybullet.disconnect(self._client)
             self._client = -1
-
-    @property
-    def T_world_base(self) -> FloatArray:
-        """The true pose (4, 4) of the base."""
-        p, q = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
-        T_world_com = from_quaternion_wxyz([q[3], q[0], q[1], q[2]], p)
-        # PyBullet reports the centre of mass.
-        return T_world_com @ self._T_com_base
 
     def encoders_rad(self) -> FloatArray:
         """Turns (2,) of the left and the right wheels since the start [rad]; the two on a side are geared together."""
@@ -92,8 +86,15 @@ class Pioneer:
         encoders = self.encoders_rad()
         self.odometry.update(*(encoders - self._encoders_rad))
         self._encoders_rad = encoders
+        self.T_world_base = self._pose()
         if self.T_world_base[2, 2] < np.sqrt(1 - MAX_TILT**2):
             raise SimulationError(f"the robot fell over at {self.time_s:.1f} s")
+
+    def _pose(self) -> FloatArray:
+        p, q = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
+        T_world_com = from_quaternion_wxyz([q[3], q[0], q[1], q[2]], p)
+        # PyBullet reports the centre of mass.
+        return T_world_com @ self._T_com_base
 
     def _spin(self, wheels_radps: list[float], steps: int) -> None:
         pybullet.setJointMotorControlArray(

@@ -1,4 +1,4 @@
-"""Rendering a world by casting one ray a pixel: image and true depth come from the same rays."""
+"""Rendering a world: the face that each pixel sees, its texture and light, and its depth, all from the same planes."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ from . import shading
 from .atlas import Atlas
 from .lighting import FacePlanes, Sheets, bake
 from .scene import World
+from .visibility import first_faces
 
-SUBPIXELS = np.array([[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]])
-"""Edges between faces are the mean of four rays: one ray would leave stairs that left and right do not share."""
-
+SUBPIXELS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
+"""Edges between faces are the mean of four looks: one would leave stairs that left and right do not share."""
 
 EDGE_CONTRAST = 8.0
-"""Fainter edges [gray levels] are left alone: softening them costs rays and shows nothing."""
+"""Fainter edges [gray levels] are left alone: softening them costs time and shows nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,43 +36,41 @@ class Renderer:
     """A world ready to be photographed. Rendering is a pure function and may run in several threads."""
 
     def __init__(self, world: World) -> None:
+        self._vertices_m = world.vertices_m
+        self._corners = np.concatenate(world.face_corners)
+        self._starts = np.cumsum([0, *(len(corners) for corners in world.face_corners)])
         self._faces = _face_planes(world)
-        self._face_of_triangle = world.face_of_triangle
-        self._scene = EmbreeScene()
-        # Embree keeps no copy of its own of these: they must outlive the scene.
-        self._vertices = world.vertices_m.astype(np.float32)
-        TriangleMesh(self._scene, self._vertices, world.triangles)
-        self._atlas = Atlas.pack(world.textures)
-        glows = np.array([world.textures[f.texture].glows for solid in world.solids for f in solid.faces])
-        self._sheets: Sheets = bake(self._scene, self._faces, lamps=world.lamps, ambient=world.ambient, glows=glows)
-        self._tiles = _tiles(world, self._atlas)
+        atlas = Atlas.pack(world.textures)
+        sheets = _lit(world, self._faces)
+        self._surfaces = shading.Surfaces(
+            _tiles(world, atlas), sheets.sheets, sheets.lights, atlas.levels, atlas.texels
+        )
+
+    def faces(self, camera: StereoCamera, T_world_cam: FloatArray) -> NDArray[np.int32]:
+        """The face (H, W) of the world that each pixel sees, -1 for none; see `view`."""
+        return self._visible(_camera_rays(camera, T_world_cam), camera.shape)[0]
 
     def view(self, camera: StereoCamera, T_world_cam: FloatArray) -> View:
         """The picture and the depth of a single pinhole camera at T_world_cam (4, 4), an optical frame."""
         rays = _camera_rays(camera, T_world_cam)
-        directions = shading.pixel_rays(rays, camera.width_px, camera.height_px)
-        faces = self._first_faces(rays[0], directions).reshape(camera.shape)
-        scene = (
-            shading.project_planes(self._faces.normals, self._faces.offsets, self._faces.axes, rays),
-            self._tiles,
-            self._sheets.sheets,
-            self._atlas.levels,
-            self._atlas.texels,
-            self._sheets.lights,
-        )
-        gray, depth_m = shading.shade(faces, *scene)
-        pixels = shading.edge_pixels(faces, gray, EDGE_CONTRAST)
-        between = shading.subpixel_rays(rays, pixels, SUBPIXELS)
-        shading.soften(gray, pixels, SUBPIXELS, self._first_faces(rays[0], between).reshape(-1, 4), *scene)
+        faces, planes = self._visible(rays, camera.shape)
+        gray, depth_m = shading.shade(faces, planes, self._surfaces)
+        edges = shading.edge_pixels(faces, gray, EDGE_CONTRAST)
+        soft = np.zeros_like(gray)
+        for dx, dy in SUBPIXELS:
+            shifted = rays + [[0.0], [0.0], [0.0], [1.0]] * (dx * rays[1] + dy * rays[2])
+            faces, planes = self._visible(shifted, camera.shape)
+            soft += shading.shade(np.where(edges, faces, np.int32(-1)), planes, self._surfaces)[0]
+        gray[edges] = soft[edges] / len(SUBPIXELS)
         return View((np.minimum(gray, 255) + 0.5).astype(np.uint8), depth_m)
 
-    def _first_faces(self, eye_m: FloatArray, directions: NDArray[np.float32]) -> NDArray[np.int32]:
-        """The face (N,) that each ray (N, 3) from the eye meets first, -1 for none."""
-        origins = np.empty_like(directions)
-        origins[:] = eye_m.astype(np.float32)
-        triangles = self._scene.run(origins, directions, query="INTERSECT")
-        faces: NDArray[np.int32] = shading.faces_of(triangles, self._face_of_triangle)
-        return faces
+    def _visible(self, rays: FloatArray, shape: tuple[int, int]) -> tuple[NDArray[np.int32], FloatArray]:
+        """The face (H, W) that each pixel sees, -1 for none, and the planes of all faces as shading wants them."""
+        planes: FloatArray = shading.project_planes(self._faces.normals, self._faces.offsets, self._faces.axes, rays)
+        # einsum, unlike matmul, sums in the same order on any number of threads.
+        points = np.einsum("va,ab->vb", self._vertices_m - rays[0], np.linalg.inv(rays[1:]))
+        faces: NDArray[np.int32] = first_faces(points, self._corners, self._starts, planes, shape)
+        return faces, planes
 
 
 def _camera_rays(camera: StereoCamera, T_world_cam: FloatArray) -> FloatArray:
@@ -91,6 +89,15 @@ def _face_planes(world: World) -> FacePlanes:
     offsets = np.array([float(points[0] @ n) for points, n in zip(corners, normals, strict=True)])
     flat = [points @ a.T for points, a in zip(corners, axes, strict=True)]
     return FacePlanes(normals, offsets, axes, np.array([(st.min(axis=0), st.max(axis=0)) for st in flat]))
+
+
+def _lit(world: World, faces: FacePlanes) -> Sheets:
+    scene = EmbreeScene()
+    # Embree keeps no copy of its own of these: they must outlive the scene.
+    vertices = world.vertices_m.astype(np.float32)
+    TriangleMesh(scene, vertices, world.triangles)
+    glows = np.array([world.textures[f.texture].glows for solid in world.solids for f in solid.faces])
+    return bake(scene, faces, lamps=world.lamps, ambient=world.ambient, glows=glows)
 
 
 def _tiles(world: World, atlas: Atlas) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Numba kernels of the renderer: visibility and light baking in, brightness and depth out. Arrays only.
+"""Numba kernels of the renderer: the faces in view in, brightness and depth out. Arrays only.
 
 Per face (rows of `planes`): at pixel (x, y) of a pinhole camera the inverse depth, and the in-plane coordinates
 times the inverse depth, are affine in x and y. A row holds the nine coefficients: inverse depth (x, y, 1),
@@ -6,11 +6,13 @@ s / z (x, y, 1), t / z (x, y, 1), with s and t in metres along the face's textur
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from stereogrid.geometry import Array, FloatArray
+
+from .kernel import inner, kernel
 
 MAX_TAPS = 6
 """Most samples along the long side of a pixel's footprint; beyond a ratio of 9 the texture blurs."""
@@ -18,11 +20,30 @@ MAX_TAPS = 6
 TAP_PITCH = 1.5
 """Distance of those samples in texels of their level: neighbours just overlap."""
 
-_kernel = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-_inner = njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "arcp", "nsz"}, inline="always")
+RUN_PX = 4
+"""Neighbours in a row that share one footprint: it hardly changes from pixel to pixel."""
+
+POSITIVE = float(1 << 20)
+"""Added to texel coordinates, so that cutting their fraction off rounds down; it shifts no texture that tiles."""
+
+Pair = tuple[float, float]
 
 
-@_kernel
+class Surfaces(NamedTuple):
+    """How the F faces look.
+
+    tiles (F, 6): texture origin s, t [m]; tiles per metre along s, t; first and past-the-last level.
+    sheets (F, 7), lights: see lighting.Sheets. levels, texels: see atlas.Atlas.
+    """
+
+    tiles: Array
+    sheets: Array
+    lights: Array
+    levels: Array
+    texels: Array
+
+
+@kernel
 def project_planes(normals: Array, offsets: Array, axes: Array, camera: Array) -> FloatArray:
     """Coefficients (F, 9) of F planes normals . p = offsets with texture axes (F, 2, 3), in a camera.
 
@@ -45,62 +66,56 @@ def project_planes(normals: Array, offsets: Array, axes: Array, camera: Array) -
     return planes
 
 
-@_inner
-def _bilinear(texels: Array, levels: Array, level: int, u: float, v: float) -> float:
-    """One level of a texture that tiles, at (u, v) in tiles; its columns and rows are powers of two."""
-    start, columns, rows = levels[level, 0], levels[level, 1], levels[level, 2]
-    x, y = u * columns - 0.5, v * rows - 0.5
-    x_low, y_low = math.floor(x), math.floor(y)
-    fx, fy = x - x_low, y - y_low
-    x0, y0 = int(x_low) & (columns - 1), int(y_low) & (rows - 1)
-    x1, y1 = (x0 + 1) & (columns - 1), (y0 + 1) & (rows - 1)
-    row0, row1 = start + y0 * columns, start + y1 * columns
-    top = (1.0 - fx) * texels[row0 + x0] + fx * texels[row0 + x1]
-    bottom = (1.0 - fx) * texels[row1 + x0] + fx * texels[row1 + x1]
-    value: float = (1.0 - fy) * top + fy * bottom
-    return value
-
-
-@_inner
-def _filtered(
-    texels: Array,
-    levels: Array,
-    first: int,
-    last: int,
-    u: float,
-    v: float,
-    du_dx: float,
-    dv_dx: float,
-    du_dy: float,
-    dv_dy: float,
-) -> float:
-    """The texture's mean over a pixel's footprint: trilinear samples along its long side."""
-    columns, rows = levels[first, 1], levels[first, 2]
-    ax, ay, bx, by = du_dx * columns, dv_dx * rows, du_dy * columns, dv_dy * rows
+@inner
+def _footprint(x: float, y: float, f: int, planes: Array, surfaces: Surfaces) -> tuple[int, float, int, float, float]:
+    """How to read a texture at a pixel: level, share of the next one, taps, and the step between them [tiles]."""
+    tiles, levels = surfaces.tiles, surfaces.levels
+    first, last = int(tiles[f, 4]), int(tiles[f, 5]) - 1
+    z = 1.0 / (planes[f, 0] * x + planes[f, 1] * y + planes[f, 2])
+    s = (planes[f, 3] * x + planes[f, 4] * y + planes[f, 5]) * z
+    t = (planes[f, 6] * x + planes[f, 7] * y + planes[f, 8]) * z
+    columns, rows = levels[first, 1] * tiles[f, 2] * z, levels[first, 2] * tiles[f, 3] * z
+    ax, ay = (planes[f, 3] - s * planes[f, 0]) * columns, (planes[f, 6] - t * planes[f, 0]) * rows
+    bx, by = (planes[f, 4] - s * planes[f, 1]) * columns, (planes[f, 7] - t * planes[f, 1]) * rows
     a2, b2 = ax * ax + ay * ay, bx * bx + by * by
-    step_u, step_v, long2 = (du_dx, dv_dx, a2) if a2 > b2 else (du_dy, dv_dy, b2)
-    long = math.sqrt(long2) + 1e-12
+    step_x, step_y = (ax, ay) if a2 > b2 else (bx, by)
+    long = math.sqrt(max(a2, b2)) + 1e-12
     short = max(abs(ax * by - ay * bx) / long, long / (MAX_TAPS * TAP_PITCH), 1.0)
-    taps = max(1, math.ceil(long / (short * TAP_PITCH)))
-    detail = math.log2(short)
-    low = min(first + int(detail + 0.15), last)
+    taps = min(max(1, math.ceil(long / (short * TAP_PITCH))), MAX_TAPS)
+    detail = math.log2(short) + 0.15
+    level = min(first + int(detail), last)
     # Blending only in the middle of the way between two levels spares a third of the reads.
-    blend = min(max((detail + 0.15 - int(detail + 0.15) - 0.3) / 0.7, 0.0), 1.0)
+    blend = min(max((detail - int(detail) - 0.3) / 0.7, 0.0), 1.0) if level < last else 0.0
+    return level, blend, taps, step_x / (taps * levels[first, 1]), step_y / (taps * levels[first, 2])
+
+
+@inner
+def _tap_mean(surfaces: Surfaces, level: int, uv: Pair, step: Pair, taps: int) -> float:
+    """Mean of bilinear samples about (u, v), all in tiles; the columns and rows of a level are powers of two."""
+    levels, texels = surfaces.levels, surfaces.texels
+    start, columns, rows = levels[level, 0], levels[level, 1], levels[level, 2]
+    dx, dy = step[0] * columns, step[1] * rows
+    x = uv[0] * columns - 0.5 - 0.5 * (taps - 1) * dx + POSITIVE
+    y = uv[1] * rows - 0.5 - 0.5 * (taps - 1) * dy + POSITIVE
     total = 0.0
-    for k in range(taps):
-        shift = (k + 0.5) / taps - 0.5
-        at_u, at_v = u + shift * step_u, v + shift * step_v
-        value = _bilinear(texels, levels, low, at_u, at_v)
-        if blend > 0.0 and low < last:
-            value += blend * (_bilinear(texels, levels, low + 1, at_u, at_v) - value)
-        total += value
+    for _ in range(taps):
+        column, row = int(x), int(y)
+        fx, fy = x - column, y - row
+        x0, x1 = column & (columns - 1), (column + 1) & (columns - 1)
+        row0, row1 = start + (row & (rows - 1)) * columns, start + ((row + 1) & (rows - 1)) * columns
+        top = (1.0 - fx) * texels[row0 + x0] + fx * texels[row0 + x1]
+        bottom = (1.0 - fx) * texels[row1 + x0] + fx * texels[row1 + x1]
+        total += (1.0 - fy) * top + fy * bottom
+        x += dx
+        y += dy
     mean: float = total / taps
     return mean
 
 
-@_inner
-def _light(lights: Array, sheets: Array, face: int, s: float, t: float) -> float:
-    """Light at (s, t) [m] on a face; a sheet is start, columns, rows, s0, t0 [m], texels per metre along s, t."""
+@inner
+def _light(surfaces: Surfaces, face: int, s: float, t: float) -> float:
+    """Light at (s, t) [m] on a face; see lighting.Sheets."""
+    sheets, lights = surfaces.sheets, surfaces.lights
     start, columns, rows = int(sheets[face, 0]), int(sheets[face, 1]), int(sheets[face, 2])
     x = min(max((s - sheets[face, 3]) * sheets[face, 5] - 0.5, 0.0), columns - 1.0)
     y = min(max((t - sheets[face, 4]) * sheets[face, 6] - 0.5, 0.0), rows - 1.0)
@@ -114,69 +129,50 @@ def _light(lights: Array, sheets: Array, face: int, s: float, t: float) -> float
     return value
 
 
-@_inner
-def _brightness(
-    x: float,
-    y: float,
-    f: int,
-    planes: Array,
-    tiles: Array,
-    sheets: Array,
-    levels: Array,
-    texels: Array,
-    lights: Array,
-) -> tuple[float, float]:
-    """The brightness, 0 to 255, of face f at one pixel, and its depth [m]."""
-    per_depth = planes[f, 0] * x + planes[f, 1] * y + planes[f, 2]
-    z = 1.0 / per_depth
-    s = (planes[f, 3] * x + planes[f, 4] * y + planes[f, 5]) * z
-    t = (planes[f, 6] * x + planes[f, 7] * y + planes[f, 8]) * z
-    across, down = tiles[f, 2], tiles[f, 3]
-    value = _filtered(
-        texels,
-        levels,
-        int(tiles[f, 4]),
-        int(tiles[f, 5]) - 1,
-        (s - tiles[f, 0]) * across,
-        (t - tiles[f, 1]) * down,
-        (planes[f, 3] - s * planes[f, 0]) * z * across,
-        (planes[f, 6] - t * planes[f, 0]) * z * down,
-        (planes[f, 4] - s * planes[f, 1]) * z * across,
-        (planes[f, 7] - t * planes[f, 1]) * z * down,
-    )
-    return value * _light(lights, sheets, f, s, t), z
+@inner
+def _shade_run(run: tuple[int, int, int], f: int, planes: Array, surfaces: Surfaces, out: tuple[Array, Array]) -> None:
+    """Write the brightness, 0 to 255, and the depth [m] of face f to a run of pixels: row y, columns x to end."""
+    y, x_first, x_end = run
+    tiles = surfaces.tiles
+    level, blend, taps, du, dv = _footprint(0.5 * (x_first + x_end - 1), y, f, planes, surfaces)
+    for x in range(x_first, x_end):
+        z = 1.0 / (planes[f, 0] * x + planes[f, 1] * y + planes[f, 2])
+        s = (planes[f, 3] * x + planes[f, 4] * y + planes[f, 5]) * z
+        t = (planes[f, 6] * x + planes[f, 7] * y + planes[f, 8]) * z
+        uv = ((s - tiles[f, 0]) * tiles[f, 2], (t - tiles[f, 1]) * tiles[f, 3])
+        value = _tap_mean(surfaces, level, uv, (du, dv), taps)
+        if blend > 0.0:
+            coarse = _tap_mean(surfaces, level + 1, uv, (du, dv), taps)
+            value += blend * (coarse - value)
+        out[0][y, x] = value * _light(surfaces, f, s, t)
+        out[1][y, x] = z
 
 
-@_kernel
-def shade(
-    faces: Array, planes: Array, tiles: Array, sheets: Array, levels: Array, texels: Array, lights: Array
-) -> tuple[Array, Array]:
+@kernel
+def shade(faces: Array, planes: Array, surfaces: Surfaces) -> tuple[Array, Array]:
     """Brightness (H, W) float32 and depth z (H, W) float32 [m]; 0 and NaN where no face was hit (faces < 0)."""
     height, width = faces.shape
-    gray, depth = np.zeros((height, width), np.float32), np.full((height, width), np.nan, np.float32)
+    gray, depth = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
     for y in range(height):
-        for x in range(width):
-            f = faces[y, x]
+        x = 0
+        while x < width:
+            f, end = faces[y, x], x + 1
+            while end < min(x + RUN_PX, width) and faces[y, end] == f:
+                end += 1
             if f >= 0:
-                gray[y, x], depth[y, x] = _brightness(x, y, f, planes, tiles, sheets, levels, texels, lights)
+                _shade_run((y, x, end), f, planes, surfaces, (gray, depth))
+            else:
+                for i in range(x, end):
+                    gray[y, i], depth[y, i] = 0.0, np.nan
+            x = end
     return gray, depth
 
 
-@_kernel
-def faces_of(triangles: Array, face_of_triangle: Array) -> Array:
-    """The face (N,) int32 of each triangle (N,), -1 for -1."""
-    faces = np.empty(len(triangles), np.int32)
-    for n in range(len(triangles)):
-        faces[n] = face_of_triangle[triangles[n]] if triangles[n] >= 0 else -1
-    return faces
-
-
-@_kernel
+@kernel
 def edge_pixels(faces: Array, gray: Array, contrast: float) -> Array:
-    """(N, 2) int32 columns and rows of pixels that differ from a neighbour in face, and in gray by `contrast`."""
+    """(H, W) bool: pixels that differ from a neighbour in face, and in gray by more than `contrast`."""
     height, width = faces.shape
-    pixels = np.empty((height * width, 2), np.int32)
-    n = 0
+    edges = np.empty((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
             found = False
@@ -184,54 +180,5 @@ def edge_pixels(faces: Array, gray: Array, contrast: float) -> Array:
                 i, j = min(max(y + dy, 0), height - 1), min(max(x + dx, 0), width - 1)
                 if faces[i, j] != faces[y, x] and abs(gray[i, j] - gray[y, x]) > contrast:
                     found = True
-            if found:
-                pixels[n, 0], pixels[n, 1] = x, y
-                n += 1
-    return pixels[:n].copy()
-
-
-@_kernel
-def soften(
-    gray: Array,
-    pixels: Array,
-    subpixels: Array,
-    faces: Array,
-    planes: Array,
-    tiles: Array,
-    sheets: Array,
-    levels: Array,
-    texels: Array,
-    lights: Array,
-) -> None:
-    """Set the brightness of edge pixels (N, 2) to the mean over rays at offsets subpixels (M, 2), faces (N, M)."""
-    for n in range(len(pixels)):
-        total = 0.0
-        for m in range(len(subpixels)):
-            f = faces[n, m]
-            if f >= 0:
-                x, y = pixels[n, 0] + subpixels[m, 0], pixels[n, 1] + subpixels[m, 1]
-                total += _brightness(x, y, f, planes, tiles, sheets, levels, texels, lights)[0]
-        gray[pixels[n, 1], pixels[n, 0]] = total / len(subpixels)
-
-
-@_kernel
-def subpixel_rays(camera: Array, pixels: Array, subpixels: Array) -> Array:
-    """Directions (N * M, 3) float32 in the world of the rays at offsets subpixels (M, 2) from pixels (N, 2)."""
-    rays = np.empty((len(pixels) * len(subpixels), 3), np.float32)
-    for n in range(len(pixels)):
-        for m in range(len(subpixels)):
-            x, y = pixels[n, 0] + subpixels[m, 0], pixels[n, 1] + subpixels[m, 1]
-            for a in range(3):
-                rays[n * len(subpixels) + m, a] = camera[1, a] * x + camera[2, a] * y + camera[3, a]
-    return rays
-
-
-@_kernel
-def pixel_rays(camera: Array, width: int, height: int) -> Array:
-    """Directions (H * W, 3) float32 in the world of the rays through the pixel centres, row after row."""
-    rays = np.empty((height * width, 3), np.float32)
-    for y in range(height):
-        for x in range(width):
-            for a in range(3):
-                rays[y * width + x, a] = camera[1, a] * x + camera[2, a] * y + camera[3, a]
-    return rays
+            edges[y, x] = found
+    return edges

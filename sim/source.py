@@ -4,16 +4,16 @@ from collections import deque
 from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, hypot, pi, remainder
 
 import numpy as np
 
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import InvalidInputError
-from stereogrid.geometry import FloatArray, inverse, rotation_angle_rad
+from stereogrid.geometry import FloatArray, yaw_rad
 from stereogrid.observation import Image, Observation, Odometry, Truth
 
-from .follower import PathFollower
+from .follower import MAX_TURN_RADPS, PathFollower
 from .pioneer import TICK_S, Pioneer, SimulationError
 from .render import Renderer, View
 from .rig import StereoRig
@@ -83,6 +83,9 @@ class Drive:
     def moments(self) -> Iterator[Moment]:
         """The physics alone: when and where the pictures are taken."""
         follower = PathFollower(self.world.waypoints_m, self.speed_mps, self.max_distance_m)
+        # Half a tick's motion less, so that a pair is taken at the tick nearest to where it is due.
+        step_m = self.every_m - 0.5 * TICK_S * self.speed_mps
+        step_rad = self.every_rad - 0.5 * TICK_S * MAX_TURN_RADPS
         watch = _Watch()
         with Pioneer(self.world) as robot:
             last = _moment(robot, follower)
@@ -90,7 +93,7 @@ class Drive:
             while not follower.arrived:
                 robot.drive(*follower.command(robot.T_world_base, TICK_S))
                 watch.check(robot, follower)
-                if _has_moved(last.T_world_base, robot.T_world_base, self.every_m, self.every_rad):
+                if _has_moved(last.T_world_base, robot.T_world_base, step_m, step_rad):
                     last = _moment(robot, follower)
                     yield last
 
@@ -127,6 +130,8 @@ def _moment(robot: Pioneer, follower: PathFollower) -> Moment:
     return Moment(robot.time_s, robot.T_world_base, robot.odometry.reading(), progress)
 
 
-def _has_moved(T_world_last: FloatArray, T_world_now: FloatArray, every_m: float, every_rad: float) -> bool:
-    T_last_now = inverse(T_world_last) @ T_world_now
-    return float(np.linalg.norm(T_last_now[:3, 3])) >= every_m or rotation_angle_rad(T_last_now) >= every_rad
+def _has_moved(T_world_last: FloatArray, T_world_now: FloatArray, step_m: float, step_rad: float) -> bool:
+    """Whether the robot, which stays on the floor, moved or turned that far."""
+    x_m, y_m = T_world_now[:2, 3] - T_world_last[:2, 3]
+    turned_rad = remainder(yaw_rad(T_world_now) - yaw_rad(T_world_last), 2 * pi)
+    return hypot(x_m, y_m) >= step_m or abs(turned_rad) >= step_rad

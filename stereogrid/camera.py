@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidInputError
-from .geometry import FloatArray, as_floats
+from .geometry import FloatArray, as_floats, as_pose
+
+DISTORTION_SIZES = (4, 5, 8, 12, 14)
+"""How many coefficients OpenCV's pinhole distortion may have."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ class StereoCamera:
         size_px is (width, height). The right matrix holds -focal * baseline in its fourth column.
         """
         P0, P1 = (_projection(P, side) for P, side in ((P_left, "left"), (P_right, "right")))
+        if P0[0, 0] <= 0:
+            raise InvalidInputError(f"the left projection matrix has the focal length P[0, 0] = {P0[0, 0]:g}, not > 0")
         if not np.allclose(P0[:, :3], P1[:, :3], atol=1e-3):
             raise InvalidInputError("the projection matrices do not belong to one rectified pair: P[:, :3] differ")
         if not np.isclose(P0[0, 0], P0[1, 1], rtol=1e-6):
@@ -124,6 +129,18 @@ def _projection(P: ArrayLike, side: str) -> FloatArray:
     return matrix
 
 
+def _intrinsics(K: ArrayLike, distortion: ArrayLike, side: str) -> tuple[FloatArray, FloatArray]:
+    matrix, coefficients = as_floats(K), as_floats(distortion).reshape(-1, 1)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise InvalidInputError(f"the {side} intrinsics must be (3, 3) and finite, not {matrix.shape}")
+    if coefficients.size not in DISTORTION_SIZES or not np.isfinite(coefficients).all():
+        raise InvalidInputError(
+            f"the {side} distortion must be {', '.join(map(str, DISTORTION_SIZES))} finite numbers as OpenCV "
+            f"orders them, not {coefficients.ravel().tolist()}"
+        )
+    return matrix, coefficients
+
+
 @dataclass(frozen=True)
 class Rectification:
     """Maps a raw, distorted pair to a rectified one.
@@ -146,18 +163,16 @@ class Rectification:
     ) -> "Rectification":
         """From (left, right) intrinsics (3, 3), OpenCV distortions, T_right_left (4, 4) and (width, height).
 
-        Invalid pixels are cropped away (alpha = 0). Raises InvalidInputError when the right camera is not to
-        the right of the left one.
+        Invalid pixels are cropped away (alpha = 0). Raises InvalidInputError when a number is missing or the
+        right camera is not to the right of the left one.
         """
-        K0, K1 = (as_floats(k) for k in K)
-        D0, D1 = (as_floats(d).reshape(-1, 1) for d in distortion)
-        if K0.shape != (3, 3) or K1.shape != (3, 3):
-            raise InvalidInputError(f"intrinsics must be (3, 3), not {K0.shape} and {K1.shape}")
+        (K0, D0), (K1, D1) = (_intrinsics(*each) for each in zip(K, distortion, ("left", "right"), strict=True))
+        T = as_pose(T_right_left, "T_right_left")
+        if not T[:3, 3].any():
+            raise InvalidInputError("the two cameras stand at one place: T_right_left has no translation")
         # OpenCV 5 wants the translation as (3, 1), not (3,).
-        t_m = np.ascontiguousarray(T_right_left[:3, 3:4])
-        R0, R1, P0, P1, *_ = cv2.stereoRectify(
-            K0, D0, K1, D1, size_px, np.ascontiguousarray(T_right_left[:3, :3]), t_m, alpha=0
-        )
+        R_right_left, t_m = np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3:4])
+        R0, R1, P0, P1, *_ = cv2.stereoRectify(K0, D0, K1, D1, size_px, R_right_left, t_m, alpha=0)
         if P1[0, 3] >= 0:
             raise InvalidInputError(f"the right camera is not to the right: baseline {-P1[0, 3] / P1[0, 0]:.4f} m")
         camera = StereoCamera.from_projections(P0, P1, size_px)

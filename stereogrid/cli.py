@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, TypeVar
 
-import click
 import numpy as np
 import typer
 from rich.console import Console
@@ -17,8 +16,9 @@ from . import mapping_run
 from .config import MappingConfig, load_config, save_config
 from .errors import InvalidInputError, StereogridError
 from .grid import OccupancyGrid
-from .recording import TruePoses, open_recording
+from .recording import TruePoses, open_recording, poses
 from .scoring import Score
+from .scoring.score import DIMENSIONLESS
 from .scoring.truth import MapTruth
 
 app = typer.Typer(
@@ -45,17 +45,19 @@ def map_command(
     num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
     cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
     max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
-    poses: Annotated[str, typer.Option(help="odometry (what the recording claims) or truth.")] = "odometry",
+    pose_source: Annotated[
+        str, typer.Option("--poses", help="odometry (what the recording claims) or truth.")
+    ] = "odometry",
     runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
 ) -> None:
     """Map a recording: runs/<stamp>-<name>/ gets the map, figures, metrics.json, config.toml and report.html."""
     source = open_recording(recording)
-    if poses not in ("odometry", "truth"):
-        raise InvalidInputError(f"--poses must be odometry or truth, not {poses!r}")
+    if pose_source not in ("odometry", "truth"):
+        raise InvalidInputError(f"--poses must be odometry or truth, not {pose_source!r}")
     chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
     chosen = _overridden(chosen, matcher, num_disparities, cell, max_range)
     result = mapping_run.map_recording(
-        TruePoses(source) if poses == "truth" else source,
+        TruePoses(source) if pose_source == "truth" else source,
         chosen,
         name=recording.resolve().stem,
         runs=runs,
@@ -89,7 +91,7 @@ def info(recording: RecordingPath) -> None:
         console.print(repr(OccupancyGrid.load(recording)), highlight=False, soft_wrap=True)
         return
     source = open_recording(recording)
-    positions = np.array([observation.T_world_cam[:3, 3] for observation in track(source, "reading", len(source))])
+    positions = poses(source)[:, :3, 3]
     length_m = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
     console.print(
         f"{type(source).__name__}: {len(source)} observations, path {length_m:.2f} m\n{source.camera}",
@@ -121,33 +123,28 @@ def config_command(path: Annotated[Path, typer.Argument(help="Where to write it.
 
 
 def track(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:
-    """items, with a progress bar on stderr."""
-    yield from rich_track(items, description=what, total=total, console=progress_console, transient=True)
+    """items, with a progress bar on stderr where that is a terminal: elsewhere even an erased bar leaves a line."""
+    disable = not progress_console.is_terminal
+    yield from rich_track(items, what, total, console=progress_console, transient=True, disable=disable)
 
 
 def _print_scores(scores: Iterable[Score]) -> None:
     table = Table("score", "value", "unit", "n", box=None)
     for row in scores:
-        unit = "" if row.unit == "1" else row.unit
-        table.add_row(row.name, f"{row.value:.4g}", unit, f"{row.n:,}")
+        unit = "" if row.unit == DIMENSIONLESS else row.unit
+        table.add_row(row.name, row.text, unit, f"{row.n:,}")
     console.print(table)
 
 
 def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
     """Run a typer command; errors that the user can put right become one line on stderr. The exit code."""
     try:
-        command(args=arguments, standalone_mode=False)
+        command(args=arguments)
     except StereogridError as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         return 1
-    except click.exceptions.Exit as stop:
-        return stop.exit_code
-    except click.ClickException as error:
-        error.show()
-        return error.exit_code
-    except (KeyboardInterrupt, click.Abort):
-        print("stopped", file=sys.stderr)  # noqa: T201
-        return 130
+    except SystemExit as stop:  # how typer ends, well or not
+        return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
 
 

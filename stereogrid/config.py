@@ -92,7 +92,7 @@ def config_from_table(kind: type[T], table: Mapping[str, Any], where: str = "") 
     for key, value in table.items():
         if key not in names:
             near = difflib.get_close_matches(key, names, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = f"; did you mean {near[0]!r}?" if near else ";"
             raise ConfigError(f"unknown key {where + key!r}{hint} choose from: {', '.join(names)}")
         values[key] = _checked(types[key], value, where + key)
     try:

@@ -11,15 +11,35 @@ from .errors import InvalidInputError
 
 @contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
-    """Yield a temporary path in path's folder; renamed to path on success, removed on failure."""
+    """Yield a temporary path in path's folder; renamed to path on success, removed on failure.
+
+    Raises InvalidInputError, naming path, when it cannot be written.
+    """
+    try:
+        temporary = _claim_beside(path)
+        try:
+            yield temporary
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def check_writable(path: Path) -> None:
+    """Raise InvalidInputError now when a file could not be written to path after long work; leaves nothing."""
+    if path.is_dir():
+        raise InvalidInputError(f"{path}: is a folder, so no file can be written there")
+    try:
+        _claim_beside(path).unlink()
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+def _claim_beside(path: Path) -> Path:
     if not path.parent.is_dir():
         raise InvalidInputError(f"{path.parent}: no such folder, so {path.name} cannot be written there")
     handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    return Path(name)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from .config import MappingConfig, save_config
-from .errors import InvalidInputError, RecordingError
+from .errors import RecordingError
 from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
+from .files import check_writable
 from .geometry import FloatArray
 from .grid import OccupancyGrid
 from .observation import Disparity, Observation, Recording
@@ -25,8 +26,8 @@ Track = Callable[[Iterable[Observation], int], Iterator[Observation]]
 class Mapped:
     """A map and what is remembered of its making.
 
-    path_T_world_cam (M, 4, 4): where the camera was taken to be; sample: an observation from the middle of the
-    drive with its disparity, for figures; density: mean share of matched pixels.
+    path_T_world_cam (M, 4, 4): where the camera was taken to be; sample: an observation a quarter of
+    the way down the drive with its disparity, for figures; density: mean share of matched pixels.
     """
 
     grid: OccupancyGrid
@@ -54,15 +55,28 @@ def untracked(items: Iterable[Observation], total: int) -> Iterator[Observation]
     yield from items
 
 
-def build_map(recording: Recording, config: MappingConfig, track: Track = untracked) -> Mapped:
-    """Map a recording. Raises RecordingError when it holds no observation."""
+def build_map(
+    recording: Recording,
+    config: MappingConfig,
+    track: Track = untracked,
+    *,
+    disparity_of: Callable[[Observation], Disparity] | None = None,
+) -> Mapped:
+    """Map a recording, by disparity_of where it is given instead of by the config's matcher.
+
+    Raises RecordingError when there is no observation.
+    """
     mapper = config.build_mapper(recording.camera)
     poses, densities, sample = [], [], None
     for n, observation in enumerate(track(recording, len(recording))):
-        disparity = mapper.step(observation)
+        if disparity_of is None:
+            disparity = mapper.step(observation)
+        else:
+            disparity = disparity_of(observation)
+            mapper.fuse(observation, disparity)
         poses.append(observation.T_world_cam)
         densities.append(disparity.density)
-        if n == len(recording) // 2:
+        if n == len(recording) // 4:
             sample = (observation, disparity)
     if sample is None:
         raise RecordingError("the recording holds no complete observation, so there is nothing to map")
@@ -80,8 +94,8 @@ def map_recording(
     track: Track = untracked,
 ) -> MappingResult:
     """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid)."""
-    if out is not None and not out.parent.is_dir():
-        raise InvalidInputError(f"{out.parent}: no such folder, so {out.name} cannot be written there")
+    if out is not None:
+        check_writable(out)
     config.build_mapper(recording.camera)  # refuses what cannot work before anything is written
     with run_folder(runs, name) as folder:
         mapped = build_map(recording, config, track)
@@ -115,7 +129,7 @@ def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options
     drawings = {
         "disparity": (
             disparity_figure(observation.left, disparity),
-            "The left image in the middle of the drive and its disparity.",
+            "The left image a quarter of the way down the drive, and its disparity.",
         ),
         "slice": (
             slice_figure(mapped.grid, height_m, path_m=mapped.path_m, **slice_options),

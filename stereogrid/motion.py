@@ -60,8 +60,9 @@ class OdometryNoise:
         rotation_sd = np.sqrt(self.rotation_per_rad * turn_rad + self.rotation_per_m * path_m)
         translation_sd = np.sqrt(self.translation_per_m * path_m + self.translation_per_rad * turn_rad)
         first, along, second = rng.standard_normal(3)
-        if path_m > 0:
-            step[:3, 3] *= 1 + along * translation_sd / path_m
+        # A turn on the spot slips too: along the heading, where the step itself has no direction.
+        direction = step[:3, 3] / path_m if path_m > 0 else step[:3, 0]
+        step[:3, 3] += along * translation_sd * direction
         # The turn's error is split between the start and the end of the step, as in the motion model's two turns.
         half_rad = rotation_sd / np.sqrt(2)
         return from_yaw(first * half_rad) @ step @ from_yaw(second * half_rad)

@@ -86,12 +86,17 @@ class Disparity:
 
     def __post_init__(self) -> None:
         d = np.ascontiguousarray(self.disparity_px, dtype=np.float32)
-        sigma = np.ascontiguousarray(np.broadcast_to(np.float32(self.sigma_px), d.shape))
+        sigma = np.asarray(self.sigma_px, dtype=np.float32)
         if d.ndim != 2:
             raise InvalidInputError(f"disparity_px must be (H, W), not {d.shape}")
+        if sigma.shape not in ((), d.shape):
+            raise InvalidInputError(f"sigma_px must be one number or as disparity_px {d.shape}, not {sigma.shape}")
+        sigma = np.ascontiguousarray(np.broadcast_to(sigma, d.shape))
         for name, array in (("disparity_px", d), ("sigma_px", sigma)):
             if np.isinf(array).any() or (array <= 0).any():
                 raise InvalidInputError(f"{name} must be positive and finite, or NaN where nothing matched")
+        if (np.isnan(sigma) & ~np.isnan(d)).any():
+            raise InvalidInputError("sigma_px is NaN where disparity_px is not: a match needs both")
         object.__setattr__(self, "disparity_px", d)
         object.__setattr__(self, "sigma_px", sigma)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from .files import written_beside
 from .scoring import SCORE_NAMES, Score
+from .scoring.score import DIMENSIONLESS
 
 STYLE = """
 :root { color-scheme: light dark; --line: #8886; }
@@ -40,22 +41,27 @@ def write_report(
     arms: Mapping[str, Sequence[Score]],
     figures: Sequence[ReportFigure],
     facts: Mapping[str, str],
+    headline: Sequence[str] = (),
+    meanings: Mapping[str, str] | None = None,
 ) -> Path:
     """Write folder/report.html with the figures inside it.
 
-    arms: scores of each arm of the experiment, by the arm's name. facts: what was run (command, seed, ...);
-    versions and the machine are added. config.toml is quoted where it stands in the folder.
+    arms: scores of each arm of the experiment, by the arm's name; those named in headline come first, all of
+    them after the figures. meanings: of scores that SCORE_NAMES does not hold. facts: what was run (command,
+    seed, ...); versions and the machine are added. config.toml is quoted where it stands in the folder.
     """
+    first = {arm: [score for score in scores if score.name in headline] for arm, scores in arms.items()}
     config = folder / "config.toml"
     parts = [
         f"<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>",
-        score_table(arms),
+        score_table(first if headline else arms, meanings),
         *(_figure(figure) for figure in figures),
+        _folded("All scores", score_table(arms, meanings)) if headline else "",
         _facts({**facts, **environment()}),
     ]
     if config.exists():
         text = html.escape(config.read_text(encoding="utf-8"))
-        parts.append(f"<details><summary>config.toml</summary><pre>{text}</pre></details>")
+        parts.append(_folded("config.toml", f"<pre>{text}</pre>"))
     body = "\n".join(parts)
     page = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -68,24 +74,25 @@ def write_report(
     return path
 
 
-def score_table(arms: Mapping[str, Sequence[Score]]) -> str:
+def score_table(arms: Mapping[str, Sequence[Score]], meanings: Mapping[str, str] | None = None) -> str:
     """The scores as an HTML table: a row a score, a column an arm, the unit and the meaning beside them."""
+    known = {name: meaning for name, (_, meaning) in SCORE_NAMES.items()} | dict(meanings or {})
     names = list(dict.fromkeys(score.name for scores in arms.values() for score in scores))
     by_arm = {arm: {score.name: score for score in scores} for arm, scores in arms.items()}
     head = "".join(f"<th>{html.escape(arm)}</th>" for arm in arms)
     rows = []
     for name in names:
         cells = "".join(f'<td class="number">{format_score(row.get(name))}</td>' for row in by_arm.values())
-        meaning = html.escape(SCORE_NAMES[name][1]) if name in SCORE_NAMES else ""
+        meaning = html.escape(known.get(name, ""))
         rows.append(f"<tr><td>{html.escape(name)}</td>{cells}<td>{meaning}</td></tr>")
-    return f"<table><caption>Scores</caption><tr><th>score</th>{head}<th>meaning</th></tr>{''.join(rows)}</table>"
+    return f"<table><tr><th>score</th>{head}<th>meaning</th></tr>{''.join(rows)}</table>"
 
 
 def format_score(score: Score | None) -> str:
-    """Three significant digits and the unit; a dash where there is no number."""
-    if score is None or score.value != score.value:
-        return "&ndash;"
-    return f"{score.value:.3g}" + ("" if score.unit == "1" else f" {html.escape(score.unit)}")
+    """The value with its unit; a dash where there is no number."""
+    if score is None:
+        return "-"
+    return html.escape(score.text + ("" if score.unit == DIMENSIONLESS else f" {score.unit}"))
 
 
 def environment() -> dict[str, str]:
@@ -112,6 +119,10 @@ def _version(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return ""
+
+
+def _folded(summary: str, content: str) -> str:
+    return f"<details><summary>{html.escape(summary)}</summary>{content}</details>"
 
 
 def _figure(figure: ReportFigure) -> str:

@@ -1,6 +1,5 @@
 """Run folders: runs/<stamp>-<name>/ appears whole or not at all, and runs/latest points at the newest."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,17 +17,18 @@ def run_folder(root: Path, name: str) -> Iterator[Path]:
     """
     try:
         root.mkdir(parents=True, exist_ok=True)
+        partial = _claim(root, f"{datetime.now():%Y%m%d-%H%M%S}-{name}")
     except OSError as error:
         raise InvalidInputError(f"{root}: results cannot be written there ({error.strerror})") from None
-    final = _free_path(root, f"{datetime.now():%Y%m%d-%H%M%S}-{name}")
-    partial = _partial_of(final)
-    partial.mkdir()
+    final = finished_path(partial)
     try:
         yield partial
         partial.rename(final)
-        _point_latest(root / "latest", final)
-    finally:
+    except BaseException:
+        # Only then: once renamed, a folder of that name is another run's.
         shutil.rmtree(partial, ignore_errors=True)
+        raise
+    _point_latest(root / "latest", final)
 
 
 def finished_path(partial: Path) -> Path:
@@ -36,21 +36,24 @@ def finished_path(partial: Path) -> Path:
     return partial.with_name(partial.name.removeprefix(".").removesuffix(".partial"))
 
 
-def _free_path(root: Path, name: str) -> Path:
-    """root/name, or root/name-2, ... when another run took it in the same second."""
-    path, n = root / name, 1
-    while path.exists() or _partial_of(path).exists():
+def _claim(root: Path, name: str) -> Path:
+    """A new hidden folder for root/name, or for root/name-2, ... when another run took that in the same second."""
+    n = 0
+    while True:
         n += 1
-        path = root / f"{name}-{n}"
-    return path
-
-
-def _partial_of(path: Path) -> Path:
-    return path.with_name(f".{path.name}.partial")
+        final = root / (name if n == 1 else f"{name}-{n}")
+        partial = final.with_name(f".{final.name}.partial")
+        try:
+            # Making the folder is the claim: of two runs at once only one succeeds.
+            partial.mkdir()
+        except FileExistsError:
+            continue
+        if not final.exists():
+            return partial
+        partial.rmdir()
 
 
 def _point_latest(link: Path, target: Path) -> None:
-    beside = link.with_name(f".latest-{os.getpid()}")
-    beside.unlink(missing_ok=True)
+    beside = link.with_name(f".latest-{target.name}")
     beside.symlink_to(target.name)
     beside.replace(link)

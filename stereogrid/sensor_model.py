@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr
+from scipy.special import expit, ndtr
 
 from .camera import StereoCamera
 from .errors import InvalidInputError, unknown_name
@@ -60,8 +60,8 @@ def log_odds(probability: ArrayLike) -> FloatArray:
 
 
 def probability(log_odds: ArrayLike) -> FloatArray:
-    """p = 1 - 1 / (1 + e^l), any shape. Eq. 2 with its sign corrected; written so that e^l cannot overflow."""
-    p: FloatArray = 0.5 * (1.0 + np.tanh(0.5 * as_floats(log_odds)))
+    """p = 1 - 1 / (1 + e^l), any shape. Eq. 2 with its sign corrected; exact where e^l would overflow or vanish."""
+    p: FloatArray = expit(as_floats(log_odds))
     return p
 
 
@@ -83,7 +83,7 @@ def depth_interval_m(
     d = as_floats(disparity_px)
     sigma = as_floats(sigma_px)
     with np.errstate(divide="ignore"):
-        far = np.where(sigma < d, camera.focal_baseline_px_m / np.maximum(d - sigma, 0.0), np.inf)
+        far: FloatArray = camera.focal_baseline_px_m / np.maximum(d - sigma, 0.0)
     return camera.depth_m(d + sigma), far
 
 

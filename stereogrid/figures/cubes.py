@@ -47,12 +47,12 @@ def cubes_figure(
         raise InvalidInputError("the map has no occupied cell in the heights to be drawn")
     cells = np.floor(centres[kept] / grid.cell_m).astype(np.int64)
     polygons, colours = _faces(cells, _colours(above_m[kept], ground_m), grid.cell_m, T_eye_world)
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = Figure(figsize=(9, 5.4), layout="constrained")
     axes = figure.add_subplot()
     axes.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors="face", linewidths=0.15))
     _draw_lines(axes, T_eye_world, np.stack([path_m[:-1], path_m[1:]], axis=1), 1.0)
     _draw_lines(axes, T_eye_world, frustum_lines_m(camera, T_world_cam), 1.6)
-    axes.set(xlim=(-0.75, 0.75), ylim=(-0.5, 0.5), aspect="equal", title=title)
+    axes.set(xlim=(-0.75, 0.75), ylim=(-0.5, 0.4), aspect="equal", title=title)
     axes.set_axis_off()
     return figure
 
@@ -60,6 +60,9 @@ def cubes_figure(
 def eye_behind(T_world_cam: FloatArray, back_m: float, up_m: float) -> FloatArray:
     """A viewer's pose (4, 4) behind and above a camera, looking a little ahead of it."""
     forward = T_world_cam[:3, 2] * [1, 1, 0]
+    if np.linalg.norm(forward) < 1e-6:
+        # A camera that looks straight down: its image's upper edge says which way is ahead.
+        forward = -T_world_cam[:3, 1] * [1, 1, 0]
     forward /= np.linalg.norm(forward)
     at = T_world_cam[:3, 3] - back_m * forward + [0, 0, up_m]
     return look_at(at, T_world_cam[:3, 3] + 0.5 * back_m * forward)

@@ -11,17 +11,17 @@ from ..files import written_beside
 DOTS_PER_INCH = 150
 
 
-def figure_png(figure: Figure) -> bytes:
+def figure_png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """The figure as PNG bytes; the same figure gives the same bytes."""
     FigureCanvasAgg(figure)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, bbox_inches="tight", metadata={"Software": None})
     return buffer.getvalue()
 
 
-def save_figure(figure: Figure, path: str | Path) -> Path:
+def save_figure(figure: Figure, path: str | Path, dots_per_inch: int = DOTS_PER_INCH) -> Path:
     """Write the figure to path (.png), beside and then renamed."""
     path = Path(path)
     with written_beside(path) as temporary:
-        temporary.write_bytes(figure_png(figure))
+        temporary.write_bytes(figure_png(figure, dots_per_inch))
     return path

@@ -1,9 +1,10 @@
-"""The native map file (.sgrid): a magic line, one line of JSON, and compressed blocks under a checksum.
+"""The native map file (.sgrid): a magic line, one line of JSON, compressed blocks, and a checksum of it all.
 
     SGRID 1\\n
-    {"cell_m": ..., "model": {...}, "fusion": ..., "clamp": ..., "n_blocks": B, "sha256": "..."}\\n
+    {"cell_m": ..., "model": {...}, "fusion": ..., "clamp": ..., "n_blocks": B}\\n
     zlib(indices int64 (B, 3) | log-odds float32 (B, 16, 16, 16) | update counts uint16 (B, 16, 16, 16))
-All little-endian; the checksum is of the uncompressed payload. Nothing in it is executed when it is read.
+    SHA-256 of all bytes before it (32 bytes)
+All little-endian. Nothing in it is executed when it is read.
 """
 
 import hashlib
@@ -28,6 +29,7 @@ MAGIC = b"SGRID 1\n"
 INDEX_BYTES = 3 * 8
 BLOCK_BYTES = INDEX_BYTES + BLOCK**3 * BYTES_PER_CELL
 LONGEST_HEADER = 10_000
+DIGEST_BYTES = 32
 
 
 def save_grid(grid: "OccupancyGrid", path: Path) -> Path:
@@ -42,10 +44,10 @@ def save_grid(grid: "OccupancyGrid", path: Path) -> Path:
         "fusion": grid.fusion,
         "clamp": grid.clamp,
         "n_blocks": n,
-        "sha256": hashlib.sha256(payload).hexdigest(),
     }
+    content = MAGIC + json.dumps(header).encode() + b"\n" + zlib.compress(payload, 1)
     with written_beside(path) as temporary:
-        temporary.write_bytes(MAGIC + json.dumps(header).encode() + b"\n" + zlib.compress(payload, 1))
+        temporary.write_bytes(content + hashlib.sha256(content).digest())
     return path
 
 
@@ -56,7 +58,7 @@ def load_grid(path: Path) -> "OccupancyGrid":
         return _build(header, payload)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
-    except (StereogridError, ValueError, KeyError, TypeError, zlib.error) as error:
+    except (StereogridError, ValueError, KeyError, TypeError, OverflowError, RecursionError, zlib.error) as error:
         raise RecordingError(f"{path}: not a sound map file: {error}") from None
 
 
@@ -64,18 +66,19 @@ def _read(path: Path) -> tuple[dict[str, Any], bytes]:
     with path.open("rb") as file:
         if file.readline(len(MAGIC)) != MAGIC:
             raise ValueError(f"expected it to start with {MAGIC.decode().strip()!r}")
-        header: dict[str, Any] = json.loads(file.readline(LONGEST_HEADER))
-        size = int(header["n_blocks"]) * BLOCK_BYTES
-        compressed = file.read()
+        line, rest = file.readline(LONGEST_HEADER), file.read()
+    compressed, digest = rest[:-DIGEST_BYTES], rest[-DIGEST_BYTES:]
+    if hashlib.sha256(MAGIC + line + compressed).digest() != digest:
+        raise ValueError("it is cut short or damaged: its checksum does not match")
+    header: dict[str, Any] = json.loads(line)
+    size = int(header["n_blocks"]) * BLOCK_BYTES
     # zlib cannot pack better than about 1000 to 1, so a size beyond that is a lie, not a map.
     if not 0 <= size <= 1100 * len(compressed):
         raise ValueError(f"{header['n_blocks']} blocks cannot be in {len(compressed)} bytes")
     unpacker = zlib.decompressobj()
     payload = unpacker.decompress(compressed, size + 1)
-    if len(payload) != size or not unpacker.eof:
-        raise ValueError("it is cut short or longer than it says")
-    if hashlib.sha256(payload).hexdigest() != header["sha256"]:
-        raise ValueError("its checksum does not match")
+    if len(payload) != size or not unpacker.eof or unpacker.unused_data:
+        raise ValueError("it is shorter or longer than it says")
     return header, payload
 
 

@@ -1,6 +1,7 @@
 """OccupancyGrid: the map, and how one observation changes it."""
 
 import hashlib
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -56,11 +57,13 @@ class OccupancyGrid:
 
     def check_fits(self, camera: StereoCamera) -> None:
         """Raise MapTooLargeError, naming the need, when one view of this camera would not fit in the limit."""
-        need_gb = view_volume_m3(camera, self.model.max_range_m) / self.cell_m**3 * BYTES_PER_CELL / 1e9
+        # Cells can be so small that their volume vanishes in a float.
+        cell_m3 = max(self.cell_m**3, sys.float_info.min)
+        need_gb = view_volume_m3(camera, self.model.max_range_m) / cell_m3 * BYTES_PER_CELL / 1e9
         if need_gb > self.memory_limit_gb:
             raise MapTooLargeError(
                 f"cells of {self.cell_m:g} m are too small: one view up to {self.model.max_range_m:g} m needs "
-                f"{need_gb:,.1f} GB, the limit is {self.memory_limit_gb:g} GB; choose larger cells or a shorter range"
+                f"{need_gb:,.6g} GB, the limit is {self.memory_limit_gb:g} GB; choose larger cells or a shorter range"
             )
 
     def integrate(

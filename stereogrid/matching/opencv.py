@@ -23,12 +23,12 @@ def check_options(num_disparities: int, block_px: int, *, smallest_block_px: int
 
 
 def check_size(image: Image, num_disparities: int, block_px: int) -> None:
-    """Raise InvalidInputError for an image on which OpenCV would read out of bounds."""
+    """Raise InvalidInputError for an image on which OpenCV would fail or read out of bounds."""
     height, width = image.shape
-    if width <= num_disparities + block_px or height < block_px:
+    if width <= num_disparities + block_px or height <= block_px:
         raise InvalidInputError(
             f"an image of {width}x{height} px is too small for {num_disparities} disparities and a block of "
-            f"{block_px} px: expected more than {num_disparities + block_px} columns and at least {block_px} rows"
+            f"{block_px} px: expected more than {num_disparities + block_px} columns and {block_px} rows"
         )
 
 

@@ -8,7 +8,7 @@ from ..observation import FloatImage, Image
 FLOOR_PX = 0.3
 """What remains on perfect texture: sub-pixel interpolation and the window's own bias."""
 GREY_NOISE = 1.0
-"""Standard deviation of a grey value's difference between the two images, in grey levels."""
+"""Standard deviation of the noise of a grey value in either image, in grey levels; hence 2 n^2 between the two."""
 LARGEST_PX = 4.0
 
 

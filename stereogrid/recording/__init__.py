@@ -50,10 +50,9 @@ def open_recording(path: str | Path) -> Recording:
     Raises RecordingError when nothing is there, it is of no known kind, or it is wrong in itself.
     """
     place = Path(path)
-    if not place.exists():
-        raise RecordingError(f"{place}: no such file or folder")
     for kind in RECORDINGS.values():
-        if kind.recognises(place):
+        if place.exists() and kind.recognises(place):
             return kind.open(place)
+    fault = "no known kind of recording" if place.exists() else "no such file or folder"
     kinds = "; ".join(f"{name}: {kind.needs}" for name, kind in RECORDINGS.items())
-    raise RecordingError(f"{place}: no known kind of recording; choose from {kinds}")
+    raise RecordingError(f"{place}: {fault}; choose from {kinds}")

@@ -59,9 +59,7 @@ class KittiRecording:
         image = _read(path)
         if image.shape != self.camera.shape:
             first = self._pairs[0][0]
-            raise RecordingError(
-                f"{path}: the image is {image.shape}, expected {self.camera.shape} as {first}"
-            )
+            raise RecordingError(f"{path}: the image is {image.shape}, expected {self.camera.shape} as {first}")
         return image
 
 

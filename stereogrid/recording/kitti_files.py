@@ -15,9 +15,7 @@ _FRAME_RATE_HZ = 10
 
 def image_names(left: Path, right: Path) -> list[str]:
     """The sorted names of the pairs in two folders. Raises RecordingError when one of a pair is missing."""
-    names = [
-        {path.name for path in side.iterdir() if path.suffix.lower() in _SUFFIXES} for side in (left, right)
-    ]
+    names = [{path.name for path in side.iterdir() if path.suffix.lower() in _SUFFIXES} for side in (left, right)]
     for folder, missing in ((right, names[0] - names[1]), (left, names[1] - names[0])):
         if missing:
             shown = ", ".join(sorted(missing)[:3]) + (", ..." if len(missing) > 3 else "")
@@ -68,14 +66,10 @@ def read_stamps(path: Path, n_images: int) -> list[float]:
     for number, line in _lines(path):
         numbers = _numbers(line, f"{path}:{number}")
         if len(numbers) != 1 or not np.isfinite(numbers[0]) or (stamps_s and numbers[0] <= stamps_s[-1]):
-            raise RecordingError(
-                f"{path}:{number}: {line.strip()!r}; expected one time a row, increasing [s]"
-            )
+            raise RecordingError(f"{path}:{number}: {line.strip()!r}; expected one time a row, increasing [s]")
         stamps_s.append(numbers[0])
     if len(stamps_s) != n_images:
-        raise RecordingError(
-            f"{path}: {len(stamps_s)} times for {n_images} images, expected one row an image"
-        )
+        raise RecordingError(f"{path}: {len(stamps_s)} times for {n_images} images, expected one row an image")
     return stamps_s
 
 

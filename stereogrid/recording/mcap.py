@@ -44,17 +44,13 @@ class McapRecording:
         self.metadata = dict(contents.metadata.get(METADATA_NAME, {}))
         try:
             self._stamps_ns = _whole_observations(contents, self.metadata)
-            self.camera = ros2.read_camera(
-                _first(contents, ros2.LEFT_INFO), _first(contents, ros2.RIGHT_INFO)
-            )
+            self.camera = ros2.read_camera(_first(contents, ros2.LEFT_INFO), _first(contents, ros2.RIGHT_INFO))
             self.T_base_cam = ros2.read_static_transform(contents.static_transforms)
             self._odometry = odometry_track([self._pose(ros2.ODOMETRY, stamp) for stamp in self._stamps_ns])
             true_stamps = contents.small.get(ros2.TRUE_POSE, {}).keys() & set(self._stamps_ns)
             self._truth = {stamp: self._pose(ros2.TRUE_POSE, stamp) for stamp in true_stamps}
         except InvalidInputError as error:
-            raise RecordingError(
-                f"{self.path}: {error}" + (f" ({self.damage})" if self.damage else "")
-            ) from error
+            raise RecordingError(f"{self.path}: {error}" + (f" ({self.damage})" if self.damage else "")) from error
         self.poses: FloatArray = np.stack([each.T_odom_base @ self.T_base_cam for each in self._odometry])
 
     @property
@@ -93,18 +89,14 @@ class McapRecording:
     def _observation(self, number: int, records_at: _RecordsAt) -> Observation:
         stamp_ns = self._stamps_ns[number]
         try:
-            left, right = (
-                self._image(topic, stamp_ns, records_at) for topic in (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE)
-            )
+            left, right = (self._image(topic, stamp_ns, records_at) for topic in (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE))
             truth = self._read_truth(stamp_ns, records_at)
             odometry = self._odometry[number]
             return Observation(stamp_ns / 10**9, left, right, odometry, self.poses[number], truth)
         except Exception as error:
             # The mcap library raises whatever its parsers stumble on.
             what = str(error) if isinstance(error, StereogridError) else f"cannot be decoded: {error!r}"
-            raise RecordingError(
-                f"{self.path}: the observation at {stamp_ns / 10**9:.9f} s: {what}"
-            ) from error
+            raise RecordingError(f"{self.path}: the observation at {stamp_ns / 10**9:.9f} s: {what}") from error
 
     def _read_truth(self, stamp_ns: int, records_at: _RecordsAt) -> Truth | None:
         if stamp_ns not in self._truth:
@@ -147,9 +139,7 @@ def _whole_observations(contents: Contents, metadata: dict[str, str]) -> list[in
         raise InvalidInputError(
             f"recording format {metadata['format_version']!r} is not known, only {FORMAT_VERSION!r}"
         )
-    missing = [
-        topic for topic in (*_REQUIRED, ros2.LEFT_INFO, ros2.RIGHT_INFO) if topic not in contents.messages
-    ]
+    missing = [topic for topic in (*_REQUIRED, ros2.LEFT_INFO, ros2.RIGHT_INFO) if topic not in contents.messages]
     if missing:
         raise InvalidInputError(f"no messages on {', '.join(missing)}")
     stamps = set.intersection(*(set(contents.messages[topic]) for topic in _REQUIRED))

@@ -87,9 +87,7 @@ class _Scanner:
         elif isinstance(record, Attachment):
             contents.attachments[record.name] = self.offset
         elif isinstance(record, Statistics) and record.message_count != self._n_messages:
-            raise InvalidInputError(
-                f"{self._n_messages} messages found where {record.message_count} were written"
-            )
+            raise InvalidInputError(f"{self._n_messages} messages found where {record.message_count} were written")
         else:
             self._take_data(record, Location(self.offset, 0))
 

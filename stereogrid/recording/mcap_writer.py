@@ -54,8 +54,7 @@ class McapWriter:
             # A limit of zero bytes closes a chunk after every message.
             self._mcap = mcap_ros2.writer.Writer(self._file, chunk_size=0)
             self._schemas = {
-                name: self._mcap.register_msgdef(name, SCHEMAS[name])
-                for name in sorted(set(ros2.TOPICS.values()))
+                name: self._mcap.register_msgdef(name, SCHEMAS[name]) for name in sorted(set(ros2.TOPICS.values()))
             }
             self._mcap.add_metadata(METADATA_NAME, checked)
             if truth_mesh_ply is not None:
@@ -71,9 +70,7 @@ class McapWriter:
         stamp_ns = self._checked_stamp_ns(observation)
         with self._reporting():
             if self._last_stamp_ns is None:
-                self._message(
-                    ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam)
-                )
+                self._message(ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam))
             # The right image comes last: an observation that has it is whole.
             for topic, message in self._messages(stamp_ns, observation):
                 self._message(topic, stamp_ns, message)
@@ -114,9 +111,7 @@ class McapWriter:
         depth = None if truth is None else truth.depth_m
         for name, image in (("image", observation.left), ("true depth", depth)):
             if image is not None and image.shape != self.camera.shape:
-                raise InvalidInputError(
-                    f"the {name} is {image.shape}, the recording's camera {self.camera.shape}"
-                )
+                raise InvalidInputError(f"the {name} is {image.shape}, the recording's camera {self.camera.shape}")
         stamp_ns = ros2.stamp_to_ns(observation.stamp_s)
         if self._last_stamp_ns is not None and stamp_ns <= self._last_stamp_ns:
             raise InvalidInputError(
@@ -128,9 +123,7 @@ class McapWriter:
         try:
             file: BinaryIO = self.path.open(mode)  # type: ignore[assignment]
         except FileExistsError:
-            raise RecordingError(
-                f"{self.path}: exists already; give another path or overwrite=True"
-            ) from None
+            raise RecordingError(f"{self.path}: exists already; give another path or overwrite=True") from None
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
         return file

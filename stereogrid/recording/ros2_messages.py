@@ -187,9 +187,7 @@ def read_depth(message: Any) -> FloatImage:
     """Depth (H, W) float32 [m] of a decoded sensor_msgs/Image. Raises InvalidInputError when it is none."""
     size = 4 * message.height * message.width
     if message.encoding != "32FC1" or message.step != 4 * message.width or len(message.data) != size:
-        raise InvalidInputError(
-            f"depth must be 32FC1 of {size} bytes, not {message.encoding} of {len(message.data)}"
-        )
+        raise InvalidInputError(f"depth must be 32FC1 of {size} bytes, not {message.encoding} of {len(message.data)}")
     order = ">" if message.is_bigendian else "<"
     depth = np.frombuffer(message.data, dtype=f"{order}f4").reshape(message.height, message.width)
     return depth.astype(np.float32)

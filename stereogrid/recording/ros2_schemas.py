@@ -18,9 +18,7 @@ _PARTS = {
     "geometry_msgs/TransformStamped": (
         "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform"
     ),
-    "sensor_msgs/RegionOfInterest": (
-        "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify"
-    ),
+    "sensor_msgs/RegionOfInterest": ("uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify"),
 }
 
 _STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
@@ -34,9 +32,7 @@ def _schema(text: str, *parts: str) -> str:
 
 SCHEMAS = {
     "std_msgs/msg/Header": _schema(_HEADER, "builtin_interfaces/Time"),
-    "sensor_msgs/msg/CompressedImage": _schema(
-        "std_msgs/Header header\nstring format\nuint8[] data", *_STAMPED
-    ),
+    "sensor_msgs/msg/CompressedImage": _schema("std_msgs/Header header\nstring format\nuint8[] data", *_STAMPED),
     "sensor_msgs/msg/Image": _schema(
         "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\n"
         "uint8 is_bigendian\nuint32 step\nuint8[] data",

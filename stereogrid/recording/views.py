@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from ..errors import InvalidInputError, RecordingError
-from ..geometry import FloatArray, inverse
+from ..geometry import FloatArray, from_yaw, inverse
 from ..observation import Observation, Recording
 
 
@@ -53,9 +53,7 @@ class Subset:
     Raises InvalidInputError unless 0 <= start, 0 <= stop and 1 <= stride.
     """
 
-    def __init__(
-        self, recording: Recording, start: int = 0, stop: int | None = None, stride: int = 1
-    ) -> None:
+    def __init__(self, recording: Recording, start: int = 0, stop: int | None = None, stride: int = 1) -> None:
         if start < 0 or stride < 1 or (stop is not None and stop < 0):
             raise InvalidInputError(
                 f"a subset needs start >= 0, stop >= 0 and stride >= 1, not {start}, {stop} and {stride}"
@@ -73,16 +71,21 @@ class Subset:
 
 
 class ShuffledPoses:
-    """A negative control: each observation claims the pose of another, by a permutation seeded with rng_seed.
+    """A negative control: each observation claims the position of another and a heading drawn anew, by rng_seed.
 
-    Everything else, truth too, stays with its images; T_odom_base agrees with the claimed pose.
+    Permuted positions alone would not do: a corridor looks alike from anywhere in it. Height, roll and pitch
+    stay, so a level floor survives. Everything else, truth too, stays with its images; T_odom_base agrees with
+    the claimed pose.
     """
 
     def __init__(self, recording: Recording, rng_seed: int) -> None:
         self._recording = recording
         self.camera = recording.camera
         self.T_base_cam = recording.T_base_cam
-        self.poses: FloatArray = np.random.default_rng(rng_seed).permutation(poses(recording))
+        rng = np.random.default_rng(rng_seed)
+        self.poses: FloatArray = rng.permutation(poses(recording))
+        for T_world_cam in self.poses:
+            T_world_cam[:3, :3] = from_yaw(rng.uniform(-np.pi, np.pi))[:3, :3] @ T_world_cam[:3, :3]
 
     def __len__(self) -> int:
         return len(self._recording)

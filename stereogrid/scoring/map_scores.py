@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
@@ -129,7 +128,7 @@ def sample_cells(
         raise InvalidInputError(f"the map must give {len(centres_m)} values in [0, 1] or NaN, not {p.shape}")
     occupied = labels.label[mask] == OCCUPIED
     tau_m = tolerance_m(visible.nearest_m[mask], labels.cell_m, camera=camera, sigma_px=sigma_px)
-    near = ~occupied & (_distance_to_occupied_m(labels, mask) <= tau_m * (1 + 1e-6))
+    near = ~occupied & (labels.distance_to_occupied_m[mask] <= tau_m * (1 + 1e-6))
     return CellSample(p, occupied, near)
 
 
@@ -140,21 +139,6 @@ def tolerance_m(
     z = nearest_m.astype(np.float64)
     dl_m = np.zeros_like(z) if camera is None else z**2 * sigma_px / camera.focal_baseline_px_m
     return np.maximum(cell_m, 2 * dl_m)
-
-
-def _distance_to_occupied_m(labels: CellLabels, mask: Mask) -> FloatArray:
-    """Distance (N,) from the centres of mask to the nearest OCCUPIED centre [m].
-
-    Exact between centres; from the surface itself it differs by half a cell's diagonal at most.
-    """
-    elsewhere = labels.label != OCCUPIED
-    if elsewhere.all():
-        return np.full(np.count_nonzero(mask), np.inf)
-    # The indices alone take half the memory that the transform's distances would.
-    nearest = distance_transform_edt(elsewhere, return_distances=False, return_indices=True)
-    gap = np.stack([axis[mask] for axis in nearest], axis=1) - np.argwhere(mask)
-    distance: FloatArray = np.linalg.norm(gap, axis=1) * labels.cell_m
-    return distance
 
 
 Values = dict[str, tuple[float, int]]

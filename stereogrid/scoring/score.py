@@ -31,6 +31,15 @@ class Score:
         object.__setattr__(self, "value", float(self.value))
         object.__setattr__(self, "n", int(self.n))
 
+    @property
+    def text(self) -> str:
+        """The value for a table, without its unit: three decimals, whole counts in full, - for NaN."""
+        if math.isnan(self.value):
+            return "-"
+        if abs(self.value) >= 1000 and self.value == round(self.value):
+            return f"{self.value:,.0f}"
+        return f"{self.value:.3f}" if abs(self.value) >= 0.001 or self.value == 0 else f"{self.value:.1e}"
+
 
 def scores_to_dict(scores: Iterable[Score]) -> dict[str, dict[str, Any]]:
     """{name: {value, unit, n}}, ready for json.dump: a value that is not finite becomes None (null).

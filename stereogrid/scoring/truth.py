@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from ..camera import StereoCamera
-from ..errors import RecordingError
+from ..errors import InvalidInputError, RecordingError
 from ..geometry import FloatArray
 from .calibration import ReliabilityTable
 from .labels import CellLabels, label_cells
@@ -64,11 +64,27 @@ class MapTruth:
         visible = visible_cells(labels, mesh, recording.camera, known, max_range_m=max_range_m, progress=progress)
         return cls(mesh, recording.camera, labels, visible)
 
-    def score(self, grid: ScoredMap, *, prior: float = 0.5, sigma_px: float = SIGMA_PX) -> list[Score]:
-        """Every score of SCORE_NAMES of a map of this drive; arguments as in score_map."""
-        return score_map(
-            grid, self.labels, self.visible, prior=prior, mesh=self.mesh, camera=self.camera, sigma_px=sigma_px
-        )
+    def between(self, low_m: float, high_m: float) -> "MapTruth":
+        """The same truth restricted to the layers of cells with centres from low_m to high_m in world z [m]."""
+        z_m = (self.labels.origin_index[2] + np.arange(self.labels.label.shape[2]) + 0.5) * self.labels.cell_m
+        kept = np.flatnonzero((z_m >= low_m) & (z_m <= high_m))
+        if not len(kept):
+            raise InvalidInputError(f"the truth has no cells between {low_m} and {high_m} m")
+        layers = slice(kept[0], kept[-1] + 1)
+        origin = self.labels.origin_index + np.array([0, 0, kept[0]])
+        labels = CellLabels(self.labels.cell_m, origin, self.labels.label[:, :, layers])
+        visible = VisibleSet(self.visible.nearest_m[:, :, layers], self.visible.in_view[:, :, layers])
+        return MapTruth(self.mesh, self.camera, labels, visible)
+
+    def score(
+        self, grid: ScoredMap, *, prior: float = 0.5, sigma_px: float = SIGMA_PX, surface: bool = True
+    ) -> list[Score]:
+        """Every score of SCORE_NAMES of a map of this drive; arguments as in score_map.
+
+        surface: whether to give those of the surface too, which take the most time.
+        """
+        mesh = self.mesh if surface else None
+        return score_map(grid, self.labels, self.visible, prior=prior, mesh=mesh, camera=self.camera, sigma_px=sigma_px)
 
     def reliability(self, grid: ScoredMap) -> ReliabilityTable:
         """The reliability diagram of a map of this drive, 10 bins of equal width."""

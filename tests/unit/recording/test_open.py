@@ -18,7 +18,7 @@ def test_an_mcap_file_is_known_under_any_name(mcap_file: Path) -> None:
 
 
 def test_a_path_that_does_not_exist_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordingError, match=r"/nowhere: no such file or folder$"):
+    with pytest.raises(RecordingError, match=r"/nowhere: no such file or folder; choose from mcap: .*kitti: "):
         open_recording(tmp_path / "nowhere")
 
 

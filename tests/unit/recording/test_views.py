@@ -39,13 +39,21 @@ def test_a_subset_refuses_what_it_cannot_read(mcap_file: Path, start: int, stop:
         Subset(McapRecording(mcap_file), start, stop, stride)
 
 
-def test_shuffled_poses_are_the_same_poses_in_an_order_of_the_seed(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+def test_shuffled_poses_permute_positions_and_turn_headings_by_the_seed(
+    tmp_path: Path, synthetic: SimpleNamespace
+) -> None:
     recording = McapRecording(synthetic.write_mcap(tmp_path / "a.mcap", synthetic.observations(8)))
     shuffled = poses(ShuffledPoses(recording, 1))
     np.testing.assert_array_equal(shuffled, poses(ShuffledPoses(recording, 1)))
     assert not np.array_equal(shuffled, poses(ShuffledPoses(recording, 2)))
     assert not np.array_equal(shuffled, poses(recording))
-    assert {T.tobytes() for T in shuffled} == {T.tobytes() for T in poses(recording)}
+    before = poses(recording)
+    assert {T[:3, 3].tobytes() for T in shuffled} == {T[:3, 3].tobytes() for T in before}
+    # Turned about the vertical only: how far the optical axis points up or down stays with the position.
+    tilt = {T[:3, 3].tobytes(): T[2, :3] for T in before}
+    for T in shuffled:
+        np.testing.assert_allclose(T[2, :3], tilt[T[:3, 3].tobytes()], atol=1e-12)
+        assert not any(np.allclose(T[:3, :3], other[:3, :3], atol=1e-3) for other in before)
 
 
 def test_shuffling_leaves_images_and_truth_together(mcap_file: Path) -> None:

@@ -20,7 +20,6 @@ from sim.scene import World
 from sim.solids import Paint, box
 from sim.source import Drive
 from sim.textures import Texture
-from sim.world import make_world
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import InvalidInputError, StereogridError
 from stereogrid.geometry import yaw_rad
@@ -32,8 +31,13 @@ SMALL = StereoRig(StereoCamera(208.5, 79.5, 59.5, 0.06, 160, 120))
 
 
 @pytest.fixture(scope="module")
-def corridor() -> World:
-    return make_world("corridor", 0)
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first 1.6 m through the corridor, rendered by three threads."""
+    shares: list[float] = []
+    path = tmp_path_factory.mktemp("drive") / "drive.mcap"
+    record_drive(path, rig=SMALL, max_distance_m=1.6, workers=3, progress=shares.append)
+    assert shares == sorted(shares) and shares[0] >= 0 and 0.8 < shares[-1] <= 1
+    return path
 
 
 def run(speed_mps: float, turn_radps: float, duration_s: float) -> tuple[float, float, WheelOdometry]:
@@ -76,11 +80,6 @@ def test_wheel_odometry_follows_an_arc_exactly() -> None:
     assert odometry.turned_rad == pytest.approx(turned)
 
 
-def test_a_drive_is_the_same_every_time_and_with_any_number_of_threads(corridor: World) -> None:
-    one, again, three = (digest(Drive(corridor, SMALL, max_distance_m=2.0, workers=workers)) for workers in (1, 1, 3))
-    assert one == again == three
-
-
 def test_the_robot_drives_the_whole_path_and_sees_all_of_it(corridor: World) -> None:
     drive = Drive(corridor, SMALL)
     moments = list(drive.moments())
@@ -116,16 +115,23 @@ def test_a_speed_beyond_the_robots_is_refused() -> None:
         PathFollower(np.array([[0.0, 0.0], [1.0, 0.0]]), speed_mps=0.9)
 
 
-def test_a_recording_gives_back_the_drive_and_the_same_bytes(corridor: World, tmp_path: Path) -> None:
-    shares: list[float] = []
-    options = {"world": "corridor", "rig": SMALL, "max_distance_m": 1.0}
-    paths = [record_drive(tmp_path / f"{k}.mcap", progress=shares.append, **options) for k in range(2)]  # type: ignore[arg-type]
-    assert paths[0].read_bytes() == paths[1].read_bytes()
-    recording = McapRecording(paths[0])
-    assert digest(recording) == digest(Drive(corridor, SMALL, max_distance_m=1.0))
+def test_a_drive_is_the_same_bytes_every_time_and_with_any_number_of_threads(recorded: Path, tmp_path: Path) -> None:
+    again = record_drive(tmp_path / "again.mcap", rig=SMALL, max_distance_m=1.6, workers=1)
+    assert again.read_bytes() == recorded.read_bytes()
+
+
+def test_a_recording_gives_back_the_drive(corridor: World, recorded: Path) -> None:
+    recording = McapRecording(recorded)
+    assert digest(recording) == digest(Drive(corridor, SMALL, max_distance_m=1.6))
     assert recording.metadata["world"] == "corridor" and recording.truth_mesh_ply() is not None
-    assert shares[len(shares) // 2 - 1] > 0.8 and all(0 <= s <= 1 for s in shares)
     assert len(NoisyImages(recording, IMAGE_NOISE["mild"], seed=0)) == len(recording)
+
+
+def test_a_drive_overwrites_no_file(recorded: Path) -> None:
+    before = recorded.read_bytes()
+    with pytest.raises(StereogridError, match="exists already"):
+        record_drive(recorded, rig=SMALL, max_distance_m=1.6)
+    assert recorded.read_bytes() == before
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,71 @@
+"""Jobs on both cores, and the progress bars that show them."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, Protocol, TypeVar
+
+from rich.console import Console
+from rich.progress import Progress
+
+WORKERS = 2
+Item = TypeVar("Item")
+
+
+class Step(Protocol):
+    """Advances a bar by one when called; `to` sets it to a share of the whole, 0 to 1."""
+
+    def __call__(self) -> None: ...
+
+    def to(self, share: float) -> None:
+        """Set the bar."""
+        ...
+
+
+Stage = Callable[[str, float], AbstractContextManager[Step]]
+"""stage("mapping", 5) shows a bar of five steps for as long as it is open."""
+
+
+def counted(step: Step) -> Callable[[Iterable[Item], int], Iterator[Item]]:
+    """A tracker of items that advances step once an item."""
+
+    def track(items: Iterable[Item], _total: int) -> Iterator[Item]:
+        for item in items:
+            yield item
+            step()
+
+    return track
+
+
+def in_parallel(jobs: Mapping[str, Callable[[], Any]], done: Callable[[], None] = lambda: None) -> dict[str, Any]:
+    """The jobs' results by name. Threads serve: OpenCV, Numba and embree let go of the interpreter.
+
+    done is called after each job. The first exception stops what has not begun and is raised.
+    """
+    with ThreadPoolExecutor(WORKERS) as pool:
+        futures = {pool.submit(job): name for name, job in jobs.items()}
+        try:
+            results = {}
+            for future in as_completed(futures):
+                results[futures[future]] = future.result()
+                done()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return {name: results[name] for name in jobs}
+
+
+@contextmanager
+def rich_stage(what: str, total: float) -> Iterator[Step]:
+    """A Stage that draws its bar on stderr and leaves nothing behind."""
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total)
+
+        class Bar:
+            def __call__(self) -> None:
+                progress.advance(task)
+
+            def to(self, share: float) -> None:
+                progress.update(task, completed=share * total)
+
+        yield Bar()

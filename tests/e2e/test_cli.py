@@ -1,0 +1,393 @@
+"""The command from a recording to a run folder, and from bad input to one line."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+
+from stereogrid import cli
+from stereogrid.camera import StereoCamera
+from stereogrid.config import MappingConfig, load_config
+from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
+from stereogrid.grid import OccupancyGrid
+from stereogrid.observation import Observation, Odometry, Truth
+from stereogrid.recording.mcap import McapWriter
+
+CAMERA = StereoCamera(focal_px=80, cx_px=59.5, cy_px=47.5, baseline_m=0.1, width_px=120, height_px=96)
+HEIGHT_M, WALL_M, SQUARE_M = 0.4, 1.8, 0.02
+T_BASE_CAM = from_rotation(R_BASE_OPTICAL, [0.0, 0.0, HEIGHT_M])
+FILES = {"map.sgrid", "config.toml", "metrics.json", "slice.png", "cubes.png", "disparity.png", "report.html"}
+
+
+def view(T_world_cam, shift_m):
+    """What an eye shift_m to the right of the camera sees: a wall across x and a floor, in squares of random grey."""
+    eye = T_world_cam[:3, 3] + T_world_cam[:3, 0] * shift_m
+    # Four rays a pixel, so that squares do not flicker.
+    picture = np.zeros(CAMERA.shape)
+    for du, dv in ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)):
+        rays = (CAMERA.ray_directions + np.array([du, dv, 0]) / CAMERA.focal_px) @ T_world_cam[:3, :3].T
+        to_wall = (WALL_M - eye[0]) / rays[..., 0]
+        to_floor = np.where(rays[..., 2] < 0, -eye[2] / np.minimum(rays[..., 2], -1e-9), np.inf)
+        points = eye + rays * np.minimum(to_wall, to_floor)[..., None]
+        i, j, k = np.moveaxis(np.floor(points / SQUARE_M + 1e-6).astype(np.int64), -1, 0)
+        picture += (i * 73856093 ^ j * 19349663 ^ k * 83492791) % 251 / 4
+    return picture.astype(np.uint8)
+
+
+def observations(n=4):
+    for number in range(n):
+        T_odom_base = from_rotation(np.eye(3), [0.03 * number, 0.01 * number, 0])
+        T = T_odom_base @ T_BASE_CAM
+        left, right = view(T, 0.0), view(T, CAMERA.baseline_m)
+        yield Observation(10 + 0.1 * number, left, right, Odometry(T_odom_base), T, Truth(T))
+
+
+def box(low, high):
+    low, high = np.array(low), np.array(high)
+    return trimesh.creation.box(high - low, trimesh.transformations.translation_matrix((low + high) / 2))
+
+
+def write_kitti(folder, n=3):
+    for side in ("image_0", "image_1"):
+        (folder / side).mkdir(parents=True)
+    for number, each in enumerate(observations(n)):
+        cv2.imwrite(str(folder / "image_0" / f"{number:06d}.png"), each.left)
+        cv2.imwrite(str(folder / "image_1" / f"{number:06d}.png"), each.right)
+    lines = [" ".join(map(str, P.ravel())) for P in CAMERA.P]
+    (folder / "calib.txt").write_text("".join(f"P{i}: {line}\n" for i, line in enumerate(lines)))
+    poses = [from_rotation(np.eye(3), [0, 0, 0.03 * i])[:3].ravel() for i in range(n)]
+    (folder / "poses.txt").write_text("".join(" ".join(map(str, pose)) + "\n" for pose in poses))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recording") / "drive.mcap"
+    world = trimesh.util.concatenate(box([WALL_M, -3, -0.2], [WALL_M + 0.1, 3, 3]), box([-1, -3, -0.1], [3, 3, 0]))
+    with McapWriter(path, CAMERA, T_BASE_CAM, truth_mesh_ply=world.export(file_type="ply")) as writer:
+        for each in observations():
+            writer.write(each)
+    return path
+
+
+def command(*arguments, cwd):
+    """The command as a user runs it, in another process and folder."""
+    line = [sys.executable, "-m", "stereogrid.cli", *map(str, arguments)]
+    return subprocess.run(line, cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def first_run(drive, tmp_path_factory):
+    cwd = tmp_path_factory.mktemp("work")
+    done = command("map", drive, "--out", "mine.sgrid", "--cell", "0.04", cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return cwd, done
+
+
+def numbers_of(table):
+    """{name: value} of the rows of a printed table of scores."""
+    rows = (re.split(r"\s+", line.strip()) for line in table.splitlines())
+    return {row[0]: row[1] for row in rows if len(row) >= 3}
+
+
+def test_mapping_fills_one_run_folder_and_points_latest_at_it(first_run):
+    cwd, _ = first_run
+    assert {each.name for each in cwd.iterdir()} == {"runs", "mine.sgrid"}
+    runs = cwd / "runs"
+    assert len(list(runs.iterdir())) == 2
+    latest = (runs / "latest").resolve()
+    assert latest.parent == runs.resolve()
+    assert re.fullmatch(r"\d{8}-\d{6}-drive", latest.name)
+    assert {each.name for each in latest.iterdir()} == FILES
+    assert (cwd / "mine.sgrid").read_bytes() == (latest / "map.sgrid").read_bytes()
+    for name in ("slice.png", "cubes.png", "disparity.png"):
+        assert np.ptp(cv2.imread(str(latest / name))) > 100
+
+
+def test_the_map_holds_the_wall_and_the_floor_where_they_are(first_run):
+    cwd, done = first_run
+    grid = OccupancyGrid.load(cwd / "mine.sgrid")
+    assert grid.cell_m == 0.04
+    along = np.stack(np.meshgrid([0.0], np.linspace(-0.5, 0.5, 30), np.linspace(0.3, 0.7, 15)), -1).reshape(-1, 3)
+    assert np.nanmean(grid.probability(along + np.array([WALL_M + 0.01, 0, 0])) > 0.5) > 0.7
+    assert np.nanmean(grid.probability(along + np.array([WALL_M - 0.5, 0, 0])) < 0.5) > 0.95
+    metrics = json.loads((cwd / "runs" / "latest" / "metrics.json").read_text())
+    height = metrics["scores"]["camera_height_m"]
+    assert height["unit"] == "m"
+    assert height["value"] == pytest.approx(HEIGHT_M, abs=grid.cell_m)
+    assert metrics["scores"]["known_cells"]["value"] == grid.n_known
+    assert 0.5 < metrics["scores"]["disparity_density"]["value"] <= 1
+    assert float(numbers_of(done.stdout)["camera_height_m"]) == pytest.approx(height["value"], abs=1e-3)
+    assert metrics["command"].startswith("stereogrid map ")
+    report = (cwd / "runs" / "latest" / "report.html").read_text()
+    assert grid.sha256() in report
+    assert report.count("data:image/png;base64,") == 3
+
+
+def test_the_config_of_a_run_repeats_it_to_the_same_map(first_run, drive, tmp_path, monkeypatch, capsys):
+    cwd, _ = first_run
+    config = cwd / "runs" / "latest" / "config.toml"
+    assert load_config(MappingConfig, config).grid.cell_m == 0.04
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["map", str(drive), "--config", str(config), "--runs", "again"]) == 0
+    again = OccupancyGrid.load("again/latest/map.sgrid")
+    assert again.sha256() == OccupancyGrid.load(cwd / "mine.sgrid").sha256()
+    assert Path("again/latest/config.toml").read_text() == config.read_text()
+    assert Path("again/latest/map.sgrid").read_bytes() == (cwd / "mine.sgrid").read_bytes()
+    assert cli.run(cli.app, ["map", str(drive), "--config", str(config), "--cell", "0.05", "--runs", "again"]) == 0
+    assert OccupancyGrid.load("again/latest/map.sgrid").cell_m == 0.05
+    assert capsys.readouterr().err == ""
+
+
+def test_a_map_is_scored_against_the_truth_in_its_recording(first_run, drive, monkeypatch, capsys):
+    cwd, _ = first_run
+    monkeypatch.chdir(cwd)
+    assert cli.run(cli.app, ["score", "mine.sgrid", str(drive), "--range", "2"]) == 0
+    scores = numbers_of(capsys.readouterr().out)
+    assert float(scores["auc"]) > 0.9
+    assert float(scores["accuracy_m"]) < 0.1
+    assert {each.name for each in cwd.iterdir()} == {"runs", "mine.sgrid"}
+
+
+def test_info_says_what_a_recording_and_a_map_hold(first_run, drive, capsys):
+    cwd, _ = first_run
+    assert cli.run(cli.app, ["info", str(drive)]) == 0
+    shown = capsys.readouterr().out
+    assert "4 observations" in shown
+    assert f"path {3 * np.hypot(0.03, 0.01):.2f} m" in shown
+    assert "120" in shown
+    assert cli.run(cli.app, ["info", str(cwd / "mine.sgrid")]) == 0
+    shown = capsys.readouterr().out
+    assert f"{OccupancyGrid.load(cwd / 'mine.sgrid').n_known:,} known cells" in shown
+
+
+def test_a_kitti_folder_is_known_from_its_path(tmp_path, monkeypatch, capsys):
+    folder = write_kitti(tmp_path / "street")
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["map", str(folder), "--cell", "0.05"]) == 0
+    assert {each.name for each in Path("runs/latest").iterdir()} == FILES
+    assert Path("runs/latest").resolve().name.endswith("-street")
+    assert "camera_height_m" in capsys.readouterr().out
+
+
+def test_the_default_config_can_be_written_and_used(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["config", "my.toml"]) == 0
+    assert load_config(MappingConfig, "my.toml") == MappingConfig()
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["map", "--help"], ["score", "--help"], ["info", "--help"]])
+def test_help_has_an_example(arguments, capsys):
+    assert cli.run(cli.app, arguments) == 0
+    shown = capsys.readouterr().out
+    assert "Usage" in shown
+    assert arguments == ["--help"] or "Example: stereogrid" in shown
+
+
+# Bad input: one line, exit code 1, and nothing new in runs/
+
+
+def kitti(change):
+    """A KITTI folder of which change(folder) spoils one thing."""
+
+    def make(folder, drive):
+        change(write_kitti(folder / "street"))
+        return ["map", folder / "street"]
+
+    return make
+
+
+def replace_line(name, line, text):
+    def change(folder):
+        lines = (folder / name).read_text().splitlines()
+        lines[line] = text
+        (folder / name).write_text("\n".join(lines) + "\n")
+
+    return change
+
+
+def pose_row(**changes):
+    numbers = np.eye(4)[:3].ravel().tolist()
+    for place, value in changes.items():
+        numbers[int(place[1:])] = value
+    return " ".join(map(str, numbers))
+
+
+def crop_right(folder):
+    path = str(folder / "image_1" / "000001.png")
+    cv2.imwrite(path, cv2.imread(path, cv2.IMREAD_GRAYSCALE)[:, :-1])
+
+
+def remove_folder(folder):
+    for path in (folder / "image_1").iterdir():
+        path.unlink()
+    (folder / "image_1").rmdir()
+
+
+def text_file(name, text, *arguments):
+    """The command with a file of this name and text in the working folder."""
+
+    def make(folder, drive):
+        (folder / name).write_text(text)
+        return [drive if argument == "DRIVE" else argument for argument in arguments]
+
+    return make
+
+
+def line(*arguments):
+    return lambda folder, drive: [drive if argument == "DRIVE" else argument for argument in arguments]
+
+
+def truncated(folder, drive):
+    (folder / "cut.mcap").write_bytes(drive.read_bytes()[:3000])
+    return ["map", "cut.mcap"]
+
+
+def damaged_map(folder, drive):
+    content = bytearray(OccupancyGrid(0.1).save(folder / "bad.sgrid").read_bytes())
+    content[40] ^= 1
+    (folder / "bad.sgrid").write_bytes(content)
+    return ["score", "bad.sgrid", drive]
+
+
+def no_truth(folder, drive):
+    OccupancyGrid(0.1).save(folder / "map.sgrid")
+    return ["score", "map.sgrid", write_kitti(folder / "street")]
+
+
+P_RIGHT = "P1: 80 0 59.5 {} 0 80 47.5 0 0 0 1 0"
+BAD_INPUT = {
+    "a path that does not exist": (line("map", "nowhere.mcap"), r"nowhere\.mcap: no such file"),
+    "a file of no known kind": (text_file("a.txt", "hello", "map", "a.txt"), r"a\.txt: .*choose from mcap: .*kitti: "),
+    "an empty folder": (line("map", "."), "no known kind"),
+    "a text file named mcap": (text_file("a.mcap", "hello", "map", "a.mcap"), r"a\.mcap"),
+    "a recording cut short before its first observation": (truncated, r"cut\.mcap"),
+    "no folder of right images": (kitti(remove_folder), "image_1"),
+    "one right image missing": (
+        kitti(lambda folder: (folder / "image_1" / "000001.png").unlink()),
+        r"image_1: 1 images are missing: 000001\.png",
+    ),
+    "a calibration of the wrong shape": (
+        kitti(replace_line("calib.txt", 1, P_RIGHT.format("-8")[:-2])),
+        r"calib\.txt:2: 11 numbers, expected 12",
+    ),
+    "images of different size": (kitti(crop_right), r"000001\.png: the image is \(96, 119\)"),
+    "a pose with a NaN": (kitti(replace_line("poses.txt", 1, pose_row(_3="nan"))), r"poses\.txt:2: .*NaN"),
+    "a pose that is not rigid": (kitti(replace_line("poses.txt", 2, pose_row(_0=1.1))), r"poses\.txt:3: .*not rigid"),
+    "a mirrored pose": (kitti(replace_line("poses.txt", 0, pose_row(_0=-1))), r"poses\.txt:1: .*not rigid"),
+    "too few poses": (kitti(replace_line("poses.txt", 2, "")), r"poses\.txt: 2 poses for 3 images"),
+    "a baseline of zero": (kitti(replace_line("calib.txt", 1, P_RIGHT.format(0))), "baseline_m must be positive"),
+    "a negative baseline": (kitti(replace_line("calib.txt", 1, P_RIGHT.format(8))), r"baseline_m .*not -0\.1"),
+    "a cell of zero": (line("map", "DRIVE", "--cell", "0"), "cell_m must be positive and finite, not 0"),
+    "a negative cell": (line("map", "DRIVE", "--cell", "-0.1"), r"cell_m .*not -0\.1"),
+    "a cell that is no number": (line("map", "DRIVE", "--cell", "nan"), "cell_m .*not nan"),
+    "a cell far too small": (
+        line("map", "DRIVE", "--cell", "0.0002"),
+        r"one view .*needs [\d,.]+ GB, the limit is 4 GB",
+    ),
+    "a cell of almost nothing": (line("map", "DRIVE", "--cell", "1e-200"), "GB, the limit is 4 GB"),
+    "a negative range": (line("map", "DRIVE", "--range", "-1"), "max_range_m"),
+    "an unknown key": (
+        text_file("my.toml", "[grid]\ncel_m = 0.1\n", "map", "DRIVE", "--config", "my.toml"),
+        r"my\.toml: unknown key 'grid\.cel_m'; did you mean 'cell_m'.*choose from: cell_m, fusion",
+    ),
+    "an unknown section": (
+        text_file("my.toml", "[camera]\nx = 1\n", "map", "DRIVE", "--config", "my.toml"),
+        r"my\.toml: unknown key 'camera'.*matcher, model",
+    ),
+    "a value of the wrong kind": (
+        text_file("my.toml", '[grid]\ncell_m = "big"\n', "map", "DRIVE", "--config", "my.toml"),
+        r"my\.toml: 'grid\.cell_m' must be float, not 'big'",
+    ),
+    "a config that is no TOML": (
+        text_file("my.toml", "[grid\ncell_m", "map", "DRIVE", "--config", "my.toml"),
+        r"my\.toml: ",
+    ),
+    "a config that is not there": (line("map", "DRIVE", "--config", "my.toml"), r"my\.toml: cannot be read"),
+    "an unknown fusion rule": (
+        text_file("my.toml", '[grid]\nfusion = "mean"\n', "map", "DRIVE", "--config", "my.toml"),
+        "'mean'; choose from: cell, sum_of_rays",
+    ),
+    "an unknown matcher": (
+        line("map", "DRIVE", "--matcher", "sgmb"),
+        "no matcher named 'sgmb'; choose from: bm, .*sgbm",
+    ),
+    "disparities that are no multiple of 16": (line("map", "DRIVE", "--num-disparities", "13"), "num_disparities .*13"),
+    "more disparities than columns": (line("map", "DRIVE", "--num-disparities", "128"), "120x96 px is too small"),
+    "an unknown source of poses": (line("map", "DRIVE", "--poses", "gps"), "'gps'"),
+    "an out in no folder": (line("map", "DRIVE", "--out", "nowhere/map.sgrid"), "nowhere: no such folder"),
+    "an out that is a folder": (line("map", "DRIVE", "--out", "."), r"error: \.: .*folder"),
+    "an out that cannot be written": (line("map", "DRIVE", "--out", "/proc/map.sgrid"), r"/proc/map\.sgrid: cannot be"),
+    "runs that are a file": (
+        text_file("file", "", "map", "DRIVE", "--runs", "file"),
+        "file: results cannot be written",
+    ),
+    "scoring a damaged map": (damaged_map, r"bad\.sgrid: not a sound map file"),
+    "scoring without a truth": (no_truth, "no true mesh"),
+    "scoring a map that is not there": (line("score", "no.sgrid", "DRIVE"), r"no\.sgrid: cannot be read"),
+    "info on nothing": (line("info", "nowhere"), "nowhere: no such file"),
+}
+
+
+@pytest.mark.parametrize("what", BAD_INPUT)
+def test_bad_input_gets_one_line_and_leaves_earlier_results_as_they_were(what, drive, tmp_path, monkeypatch, capfd):
+    make, culprit = BAD_INPUT[what]
+    monkeypatch.chdir(tmp_path)
+    earlier = tmp_path / "runs" / "20240101-000000-earlier"
+    earlier.mkdir(parents=True)
+    (earlier / "map.sgrid").write_text("an earlier result")
+    (tmp_path / "runs" / "latest").symlink_to(earlier.name)
+    arguments = [str(argument) for argument in make(tmp_path, drive)]
+    before = sorted(tmp_path.rglob("*"))
+    code = cli.run(cli.app, arguments)
+    shown = capfd.readouterr()
+    assert code == 1
+    assert len(shown.err.splitlines()) == 1, shown.err
+    assert shown.err.startswith("error: ")
+    assert re.search(culprit, shown.err), shown.err
+    assert shown.out.strip() == ""
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "runs" / "latest" / "map.sgrid").read_text() == "an earlier result"
+
+
+def test_in_a_process_of_its_own_bad_input_ends_with_exit_code_1(drive, tmp_path):
+    done = command("map", drive, "--cell", "0", cwd=tmp_path)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert "Traceback" not in done.stderr + done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_fails_half_way_leaves_no_hidden_folder(drive, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cli.mapping_run, "write_report", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
+    try:
+        code = cli.run(cli.app, ["map", str(drive), "--cell", "0.05", "--out", "mine.sgrid"])
+    except KeyboardInterrupt:
+        code = 130
+    assert code == 130
+    assert list((tmp_path / "runs").iterdir()) == []
+    assert not (tmp_path / "mine.sgrid").exists()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+# A real street
+
+
+def test_the_road_of_a_real_street_lies_as_far_under_the_camera_as_it_was_mounted(tmp_path, monkeypatch, capsys):
+    data = os.environ.get("STEREOGRID_DATA")
+    if not data:
+        pytest.skip("needs the data set sequences/kitti_straight: set STEREOGRID_DATA to shared/data")
+    street = Path(data).resolve() / "sequences" / "kitti_straight"
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["map", str(street)]) == 0
+    metrics = json.loads(Path("runs/latest/metrics.json").read_text())
+    assert metrics["scores"]["camera_height_m"]["value"] == pytest.approx(1.65, abs=0.04)
+    assert float(numbers_of(capsys.readouterr().out)["camera_height_m"]) == pytest.approx(1.65, abs=0.04)

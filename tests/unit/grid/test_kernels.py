@@ -1,0 +1,115 @@
+"""Each kernel agrees with its NumPy twin, whatever the pose, the holes and the form of the model."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stereogrid.camera import StereoCamera
+from stereogrid.grid import kernels, rays
+from stereogrid.grid.kernels import BLOCK
+from stereogrid.grid.view import blocks_in_view
+from stereogrid.sensor_model import FORMS, SensorModel, kernel_parameters
+
+from . import twins
+from .scenes import random_disparity, random_pose
+
+CAMERA = StereoCamera(focal_px=25, cx_px=17.3, cy_px=11.1, baseline_m=0.12, width_px=32, height_px=24)
+CELL_M = 0.13
+
+models = st.builds(
+    SensorModel,
+    p_free=st.floats(0.05, 0.19),
+    p_occupied=st.floats(0.81, 0.98),
+    prior=st.floats(0.2, 0.8),
+    max_range_m=st.floats(0.5, 3.0),
+    form=st.sampled_from(FORMS),
+)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def scene(seed, model):
+    rng = np.random.default_rng(seed)
+    disparity = random_disparity(rng, CAMERA)
+    image = np.stack([disparity.disparity_px, disparity.disparity_px / disparity.sigma_px], axis=-1)
+    pose = random_pose(rng, spread_m=20.0)
+    blocks = blocks_in_view(CAMERA, pose, CELL_M, max_range_m=model.max_range_m)
+    intrinsics = (CAMERA.focal_px, CAMERA.cx_px, CAMERA.cy_px, CAMERA.focal_baseline_px_m)
+    constants = np.array([*intrinsics, CELL_M, model.max_range_m])
+    return blocks, pose, constants, image, kernel_parameters(model)
+
+
+def untouched(blocks):
+    return np.full((len(blocks), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
+
+
+def lookup_of(blocks):
+    origin = blocks.min(axis=0)
+    lookup = np.full(blocks.max(axis=0) - origin + 1, -1, dtype=np.int64)
+    lookup[tuple((blocks - origin).T)] = np.arange(len(blocks))
+    return lookup, origin
+
+
+@given(seed=seeds, model=models)
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_the_sweep_agrees_with_its_twin(seed, model):
+    blocks, *arguments = scene(seed, model)
+    fast, slow = untouched(blocks), untouched(blocks)
+    kernels.sweep_cells(blocks, *arguments, fast)
+    twins.sweep_cells(blocks, *arguments, slow)
+    assert not np.isnan(fast).all()
+    np.testing.assert_allclose(fast, slow, rtol=1e-6, atol=1e-6)
+
+
+@given(seed=seeds, model=models)
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_the_vote_of_the_hits_agrees_with_its_twin_on_empty_and_on_swept_cells(seed, model):
+    blocks, *arguments = scene(seed, model)
+    swept = untouched(blocks)
+    kernels.sweep_cells(blocks, *arguments, swept)
+    for before in (untouched(blocks), swept):
+        fast, slow = before.copy(), before.copy()
+        kernels.vote_hits(*lookup_of(blocks), *arguments, fast)
+        twins.vote_hits(*lookup_of(blocks), *arguments, slow)
+        np.testing.assert_allclose(fast, slow, rtol=1e-6, atol=1e-6)
+
+
+@given(seed=seeds, model=models)
+@settings(max_examples=6, deadline=None, derandomize=True)
+def test_the_sum_of_rays_agrees_with_its_twin(seed, model):
+    blocks, *arguments = scene(seed, model)
+    fast, slow = untouched(blocks), untouched(blocks)
+    rays.sum_rays(*lookup_of(blocks), *arguments, fast)
+    twins.sum_rays(*lookup_of(blocks), *arguments, slow)
+    assert not np.isnan(fast).all()
+    # Sums of hundreds of float32 numbers of both signs, added in the same order.
+    np.testing.assert_allclose(fast, slow, rtol=1e-5, atol=1e-4)
+
+
+@given(seed=seeds, clamp=st.sampled_from([0.5, 4.0, np.inf]))
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_adding_evidence_agrees_with_its_twin_to_the_last_bit(seed, clamp):
+    rng = np.random.default_rng(seed)
+    log_odds = rng.normal(0, 2, (5, BLOCK, BLOCK, BLOCK)).astype(np.float32)
+    counts = rng.integers(0, 65536, log_odds.shape).astype(np.uint16)
+    counts[rng.random(counts.shape) < 0.2] = 65535
+    new = rng.normal(0, 2, (3, BLOCK, BLOCK, BLOCK)).astype(np.float32)
+    new[rng.random(new.shape) < 0.5] = np.nan
+    rows = rng.permutation(5)[:3]
+    fast, slow = (log_odds.copy(), counts.copy()), (log_odds.copy(), counts.copy())
+    kernels.add_evidence(rows, new, *fast, clamp)
+    twins.add_evidence(rows, new, *slow, clamp)
+    np.testing.assert_array_equal(fast[0], slow[0])
+    np.testing.assert_array_equal(fast[1], slow[1])
+    untouched_rows = [row for row in range(5) if row not in rows]
+    np.testing.assert_array_equal(fast[0][untouched_rows], log_odds[untouched_rows])
+
+
+@pytest.mark.parametrize("form", FORMS)
+@given(u=st.floats(-6, 6), half=st.floats(0.01, 20), model=models)
+@settings(derandomize=True)
+def test_the_evidence_of_one_reading_is_the_sensor_models_probability_fused(form, u, half, model):
+    parameters = (*kernel_parameters(model)[:3], form == "printed")
+    # A cell of 2 half sigmas, a sigma being one metre, ten metres away.
+    expected = twins.gain(np.float64(10 + u), 10.0, 1.0, 2 * half, parameters)
+    assert kernels.evidence.py_func(u, half, parameters) == pytest.approx(float(expected), rel=1e-9, abs=1e-9)

@@ -1,0 +1,167 @@
+"""A config is read as it was written, and a wrong line in it is named together with what would be right."""
+
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stereogrid.camera import StereoCamera
+from stereogrid.config import (
+    GridConfig,
+    MappingConfig,
+    MatcherConfig,
+    config_from_table,
+    load_config,
+    save_config,
+)
+from stereogrid.errors import ConfigError, InvalidInputError
+from stereogrid.motion import MotionError
+from stereogrid.sensor_model import SensorModel
+
+MINORU = StereoCamera(focal_px=834, cx_px=319.5, cy_px=239.5, baseline_m=0.06, width_px=640, height_px=480)
+KITTI = StereoCamera(focal_px=707.0912, cx_px=601.8873, cy_px=183.1104, baseline_m=0.5372, width_px=1226, height_px=370)
+
+positive = st.floats(1e-6, 1e6)
+configs = st.builds(
+    MappingConfig,
+    matcher=st.builds(MatcherConfig, name=st.text(max_size=8), num_disparities=st.integers(-(2**40), 2**40)),
+    model=st.builds(
+        SensorModel,
+        p_free=st.floats(0.01, 0.4),
+        prior=st.floats(0.41, 0.6),
+        p_occupied=st.floats(0.61, 0.99),
+        max_range_m=positive,
+        form=st.sampled_from(["corrected", "printed"]),
+        motion=st.sampled_from(["rss", "linear"]),
+    ),
+    motion_error=st.builds(MotionError, a_m=positive, b=positive, kappa=positive),
+    grid=st.builds(GridConfig, cell_m=positive, fusion=st.sampled_from(["cell", "sum_of_rays"]), clamp=positive),
+)
+
+
+@given(config=configs)
+def test_a_config_is_read_back_equal(tmp_path_factory, config):
+    path = tmp_path_factory.mktemp("config") / "config.toml"
+    save_config(config, path)
+    assert load_config(MappingConfig, path) == config
+
+
+def from_text(tmp_path, text):
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_config(MappingConfig, path)
+
+
+def test_what_a_file_does_not_say_keeps_its_default(tmp_path):
+    config = from_text(tmp_path, '[matcher]\nname = "sgbm"\n')
+    assert config == MappingConfig(matcher=MatcherConfig(name="sgbm"))
+    assert from_text(tmp_path, "") == MappingConfig()
+
+
+def test_a_whole_number_will_do_where_a_float_is_expected(tmp_path):
+    clamp = from_text(tmp_path, "[grid]\nclamp = 3\n").grid.clamp
+    assert (clamp, type(clamp)) == (3.0, float)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[grid]\ncel_m = 0.1\n", "unknown key 'grid.cel_m'; did you mean 'cell_m'? choose from: cell_m, fusion"),
+        ("[gird]\ncell_m = 0.1\n", "unknown key 'gird'; did you mean 'grid'? choose from: matcher, model"),
+        ("zzz = 1\n", "unknown key 'zzz'; choose from: matcher, model, motion_error, grid"),
+        ('[grid]\ncell_m = "small"\n', "'grid.cell_m' must be float, not 'small'"),
+        ("[grid]\ncell_m = true\n", "'grid.cell_m' must be float, not True"),
+        ("[matcher]\nnum_disparities = 64.0\n", "'matcher.num_disparities' must be int, not 64.0"),
+        ("[matcher]\nnum_disparities = true\n", "'matcher.num_disparities' must be int, not True"),
+        ("[matcher]\nname = 3\n", "'matcher.name' must be str, not 3"),
+        ("grid = 0.1\n", "'grid' must be a section, not 0.1"),
+        ("[[grid]]\ncell_m = 0.1\n", "'grid' must be a section, not [{'cell_m': 0.1}]"),
+        ("[model]\np_free = 0.7\n", "[model] expected 0 < p_free < prior < p_occupied < 1, not p_free 0.7"),
+        ('[model]\nform = "print"\n', "[model] no form of the sensor model named 'print'; choose from: corrected"),
+        ("[motion_error]\na_m = -1\n", "[motion_error] a_m must be >= 0 and finite, not -1.0"),
+        ("[grid\n", "at line 1"),
+    ],
+)
+def test_a_wrong_line_is_named_with_its_file_its_place_and_the_choices(tmp_path, text, message):
+    with pytest.raises(ConfigError) as refusal:
+        from_text(tmp_path, text)
+    assert str(tmp_path / "mine.toml") in str(refusal.value)
+    assert message in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_is_missing_a_folder_or_no_text_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"none\.toml: cannot be read \(No such file"):
+        load_config(MappingConfig, tmp_path / "none.toml")
+    with pytest.raises(ConfigError, match=r"cannot be read \(Is a directory\)"):
+        load_config(MappingConfig, tmp_path)
+    (tmp_path / "image.toml").write_bytes(b"\x89PNG\xff")
+    with pytest.raises(ConfigError, match=r"image\.toml: "):
+        load_config(MappingConfig, tmp_path / "image.toml")
+
+
+@dataclass(frozen=True)
+class Outer:
+    mapping: MappingConfig = field(default_factory=MappingConfig)
+    seed: int = 0
+
+
+def test_sections_within_sections_are_named_by_their_whole_path(tmp_path):
+    with pytest.raises(ConfigError, match=r"unknown key 'mapping\.grid\.cell'; did you mean 'cell_m'\?"):
+        config_from_table(Outer, {"mapping": {"grid": {"cell": 1.0}}})
+    with pytest.raises(ConfigError, match=r"\[mapping\.model\] expected 0 < p_free"):
+        config_from_table(Outer, {"mapping": {"model": {"prior": 0.95}}})
+    outer = Outer(MappingConfig.for_camera(KITTI), seed=3)
+    save_config(outer, tmp_path / "outer.toml")
+    assert load_config(Outer, tmp_path / "outer.toml") == outer
+
+
+def test_defaults_suit_the_minoru():
+    config = MappingConfig.for_camera(MINORU)
+    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.05, 5.0, 80)
+
+
+def test_defaults_suit_kitti():
+    config = MappingConfig.for_camera(KITTI)
+    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.1, 13.8, 160)
+
+
+@given(st.floats(100, 5000), st.floats(0.01, 3), st.integers(32, 4000))
+def test_defaults_of_any_camera_are_within_their_rule(focal_px, baseline_m, width_px):
+    camera = StereoCamera(focal_px, width_px / 2, 100, baseline_m, width_px, 200)
+    config = MappingConfig.for_camera(camera)
+    cell_m, range_m = config.grid.cell_m, config.model.max_range_m
+    # Eq. 8: 0.3 px are 15 cm of depth at the largest range, which is printed with one digit.
+    assert range_m == pytest.approx((0.15 * focal_px * baseline_m / 0.3) ** 0.5, abs=0.0501)
+    assert range_m / 250 * (1 - 1e-9) <= cell_m <= range_m / 100 * (1 + 1e-9)
+    assert f"{cell_m:e}"[0] in "125"
+    assert float(f"{cell_m:.0e}") == cell_m
+    assert config.matcher.num_disparities % 16 == 0
+    assert width_px / 8 - 1 <= config.matcher.num_disparities < width_px / 8 + 16
+
+
+def test_a_mapper_is_built_as_the_config_says():
+    config = MappingConfig(
+        MatcherConfig("sgbm", 48),
+        SensorModel(max_range_m=3.0, form="printed"),
+        MotionError(a_m=0.001),
+        GridConfig(cell_m=0.1, fusion="sum_of_rays", clamp=0.0, memory_limit_gb=1.0),
+    )
+    mapper = config.build_mapper(MINORU)
+    assert repr(mapper.matcher) == "SemiGlobalMatcher(num_disparities=48, block_px=3)"
+    assert mapper.grid.model == config.model
+    assert mapper.grid.clamp is None
+    assert (mapper.grid.cell_m, mapper.grid.fusion, mapper.grid.memory_limit_gb) == (0.1, "sum_of_rays", 1.0)
+    assert mapper.motion_error == config.motion_error
+    assert mapper.camera is MINORU
+
+
+def test_a_mapper_of_an_unknown_matcher_is_refused_with_the_choices():
+    with pytest.raises(InvalidInputError, match="no matcher named 'sgmb'; choose from: bm"):
+        MappingConfig(matcher=MatcherConfig("sgmb")).build_mapper(MINORU)
+
+
+def test_saving_into_a_folder_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InvalidInputError, match=r"no such folder, so config\.toml cannot be written"):
+        save_config(MappingConfig(), tmp_path / "none" / "config.toml")

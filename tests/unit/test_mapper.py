@@ -1,0 +1,130 @@
+"""Match, model, integrate, and nothing else."""
+
+import numpy as np
+import pytest
+
+from stereogrid.errors import InvalidInputError, MapTooLargeError, RecordingError
+from stereogrid.geometry import from_yaw
+from stereogrid.grid import OccupancyGrid
+from stereogrid.mapper import Mapper
+from stereogrid.mapping_run import build_map
+from stereogrid.motion import MotionError
+from stereogrid.observation import Observation, Odometry
+from stereogrid.sensor_model import SensorModel
+
+from .grid.scenes import CAMERA, FORWARD, constant_disparity, random_disparity
+
+MODEL = SensorModel(max_range_m=3.0)
+
+
+class Scripted:
+    """A matcher that gives prepared disparities and remembers what it was shown."""
+
+    def __init__(self, disparities):
+        self.disparities, self.seen = list(disparities), []
+
+    def match(self, left, right):
+        self.seen.append((left, right))
+        return self.disparities[len(self.seen) - 1]
+
+
+def observation(n, travelled_m=0.0):
+    left, right = np.random.default_rng(n).integers(0, 256, (2, *CAMERA.shape), dtype=np.uint8)
+    T = from_yaw(0.1 * n, [0.1 * n, 0, 0]) @ FORWARD
+    return Observation(float(n), left, right, Odometry(np.eye(4), travelled_m=travelled_m), T)
+
+
+def disparities(n):
+    rng = np.random.default_rng(3)
+    return [random_disparity(rng) for _ in range(n)]
+
+
+def test_a_step_fuses_what_the_matcher_found_at_the_claimed_pose_and_returns_it():
+    made = disparities(3)
+    matcher = Scripted(made)
+    mapper = Mapper(CAMERA, matcher, OccupancyGrid(0.1, model=MODEL))
+    by_hand = OccupancyGrid(0.1, model=MODEL)
+    for n, disparity in enumerate(made):
+        seen = observation(n)
+        assert mapper.step(seen) is disparity
+        assert matcher.seen[n][0] is seen.left
+        assert matcher.seen[n][1] is seen.right
+        by_hand.integrate(CAMERA, disparity, seen.T_world_cam)
+    assert mapper.grid.sha256() == by_hand.sha256()
+
+
+def test_eps_comes_from_the_distance_travelled():
+    motion = MotionError(a_m=0.01, b=0.05, kappa=2.0)
+    disparity = constant_disparity(4.0, 0.1)
+    mapper = Mapper(CAMERA, Scripted([disparity]), OccupancyGrid(0.1, model=MODEL), motion)
+    mapper.step(observation(0, travelled_m=4.0))
+    by_hand = OccupancyGrid(0.1, model=MODEL)
+    # 2 sqrt(0.01 * 4 + (0.05 * 4)^2)
+    by_hand.integrate(CAMERA, disparity, FORWARD, motion_sigma_m=2 * np.sqrt(0.08))
+    exact = OccupancyGrid(0.1, model=MODEL)
+    exact.integrate(CAMERA, disparity, FORWARD)
+    assert mapper.grid.sha256() == by_hand.sha256() != exact.sha256()
+
+
+def test_without_a_motion_error_poses_count_as_exact():
+    disparity = constant_disparity(4.0, 0.1)
+    grids = []
+    for travelled_m in (0.0, 100.0):
+        mapper = Mapper(CAMERA, Scripted([disparity]), OccupancyGrid(0.1, model=MODEL))
+        mapper.step(observation(0, travelled_m))
+        grids.append(mapper.grid.sha256())
+    assert grids[0] == grids[1]
+
+
+def test_a_grid_that_cannot_hold_one_view_is_refused_before_the_first_step():
+    matcher = Scripted([])
+    with pytest.raises(MapTooLargeError, match="GB"):
+        Mapper(CAMERA, matcher, OccupancyGrid(0.0005, model=MODEL))
+    assert not matcher.seen
+
+
+def test_a_disparity_of_another_size_is_refused():
+    other = constant_disparity(4.0, 0.1).disparity_px[:-1]
+    mapper = Mapper(CAMERA, Scripted([]), OccupancyGrid(0.1, model=MODEL))
+    with pytest.raises(InvalidInputError, match=r"\(59, 80\), the camera \(60, 80\)"):
+        mapper.fuse(observation(0), type(constant_disparity(4.0, 0.1))(other, np.float32(0.1)))
+
+
+class Drive(list):
+    camera, T_base_cam = CAMERA, FORWARD
+
+
+class Config:
+    """Stands for a MappingConfig whose matcher is scripted."""
+
+    def __init__(self, made):
+        self.matcher = Scripted(made)
+
+    def build_mapper(self, camera):
+        return Mapper(camera, self.matcher, OccupancyGrid(0.1, model=MODEL))
+
+
+def test_a_run_remembers_its_path_its_density_and_a_sample():
+    made = disparities(4)
+    drive = Drive(observation(n) for n in range(4))
+    mapped = build_map(drive, Config(made))
+    np.testing.assert_array_equal(mapped.path_T_world_cam, [each.T_world_cam for each in drive])
+    np.testing.assert_array_equal(mapped.path_m, [each.T_world_cam[:3, 3] for each in drive])
+    assert mapped.density == pytest.approx(np.mean([each.density for each in made]))
+    seen, disparity = mapped.sample
+    assert any(seen is each and disparity is found for each, found in zip(drive, made, strict=True))
+
+
+def test_given_disparities_take_the_matchers_place():
+    made = disparities(3)
+    drive = Drive(observation(n) for n in range(3))
+    by_matcher = build_map(drive, Config(made))
+    unused = Config([])
+    given = build_map(drive, unused, disparity_of=lambda each: made[int(each.stamp_s)])
+    assert not unused.matcher.seen
+    assert given.grid.sha256() == by_matcher.grid.sha256()
+
+
+def test_a_recording_without_observations_is_refused():
+    with pytest.raises(RecordingError, match="no complete observation"):
+        build_map(Drive(), Config([]))
