@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stereogrid.camera import StereoCamera
-from stereogrid.errors import StereogridError
+from stereogrid.cli import run
 
 from .record import record_drive
 from .rig import MINORU, StereoRig, mount
@@ -61,14 +61,5 @@ def record(
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB")
 
 
-def main() -> None:
-    """Turn an error into one line and exit code 1."""
-    try:
-        app()
-    except StereogridError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(1)
-
-
 if __name__ == "__main__":
-    main()
+    sys.exit(run(app))

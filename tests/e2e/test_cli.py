@@ -1,7 +1,6 @@
 """The command from a recording to a run folder, and from bad input to one line."""
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -381,11 +380,10 @@ def test_a_run_that_fails_half_way_leaves_no_hidden_folder(drive, tmp_path, monk
 # A real street
 
 
-def test_the_road_of_a_real_street_lies_as_far_under_the_camera_as_it_was_mounted(tmp_path, monkeypatch, capsys):
-    data = os.environ.get("STEREOGRID_DATA")
-    if not data:
-        pytest.skip("needs the data set sequences/kitti_straight: set STEREOGRID_DATA to shared/data")
-    street = Path(data).resolve() / "sequences" / "kitti_straight"
+def test_the_road_of_a_real_street_lies_as_far_under_the_camera_as_it_was_mounted(
+    real_data, tmp_path, monkeypatch, capsys
+):
+    street = real_data("sequences/kitti_straight").resolve()
     monkeypatch.chdir(tmp_path)
     assert cli.run(cli.app, ["map", str(street)]) == 0
     metrics = json.loads(Path("runs/latest/metrics.json").read_text())
