@@ -57,8 +57,9 @@ def in_parallel(jobs: Mapping[str, Callable[[], Any]], done: Callable[[], None] 
 
 @contextmanager
 def rich_stage(what: str, total: float) -> Iterator[Step]:
-    """A Stage that draws its bar on stderr and leaves nothing behind."""
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    """A Stage that draws its bar on stderr, where that is a terminal, and leaves nothing behind."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(what, total=total)
 
         class Bar:

@@ -1,14 +1,16 @@
 """A whole run of the mapper on a recording: map, checks, figures and report in one run folder."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from .config import MappingConfig, save_config
-from .errors import RecordingError
+from .errors import InvalidInputError, RecordingError
 from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
 from .files import check_writable
 from .geometry import FloatArray
@@ -121,35 +123,44 @@ def map_recording(
 
 
 def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options: Any) -> list[ReportFigure]:
-    """Disparity, slice and cubes of a map as PNG files in folder."""
+    """Disparity, slice and cubes of a map as PNG files in folder; what the map has nothing to show of is left out."""
     observation, disparity = mapped.sample
     height_m = float(np.median(mapped.path_m[:, 2]))
-    ground_m = -camera_height(mapped.grid, mapped.path_m).value
-    eye_m = max(3.0, 0.4 * mapped.grid.model.max_range_m)
-    drawings = {
-        "disparity": (
-            disparity_figure(observation.left, disparity),
+    drawings: list[tuple[str, str, Callable[[], Figure]]] = [
+        (
+            "disparity",
             "The left image a quarter of the way down the drive, and its disparity.",
+            lambda: disparity_figure(observation.left, disparity),
         ),
-        "slice": (
-            slice_figure(mapped.grid, height_m, path_m=mapped.path_m, **slice_options),
+        (
+            "slice",
             f"Slice of the map parallel to the ground at the camera's height, z = {height_m:.2f} m (Fig. 7).",
+            lambda: slice_figure(mapped.grid, height_m, path_m=mapped.path_m, **slice_options),
         ),
-        "cubes": (
-            cubes_figure(
-                mapped.grid,
-                observation.T_world_cam,
-                recording.camera,
-                back_and_up_m=(1.4 * eye_m, eye_m),
-                path_m=mapped.path_m,
-                heights_m=(-np.inf, 1.0),
-                ground_m=ground_m + 1.6 * mapped.grid.cell_m if np.isfinite(ground_m) else None,
-            ),
+        (
+            "cubes",
             "Occupied cells as cubes, higher ones lighter, ground in grey; the camera in red (Fig. 9). "
             "Cells more than 1 m above the camera are left out.",
+            lambda: _draw_cubes(mapped, recording),
         ),
-    }
-    return [
-        ReportFigure(save_figure(figure, folder / f"{name}.png"), caption)
-        for name, (figure, caption) in drawings.items()
     ]
+    figures = []
+    for name, caption, draw in drawings:
+        # A map without a cell at that height is a poor map, but no reason to lose it.
+        with suppress(InvalidInputError):
+            figures.append(ReportFigure(save_figure(draw(), folder / f"{name}.png"), caption))
+    return figures
+
+
+def _draw_cubes(mapped: Mapped, recording: Recording) -> Figure:
+    ground_m = -camera_height(mapped.grid, mapped.path_m).value
+    up_m = max(3.0, 0.4 * mapped.grid.model.max_range_m)
+    return cubes_figure(
+        mapped.grid,
+        mapped.sample[0].T_world_cam,
+        recording.camera,
+        back_and_up_m=(1.4 * up_m, up_m),
+        path_m=mapped.path_m,
+        heights_m=(-np.inf, 1.0),
+        ground_m=ground_m + 1.6 * mapped.grid.cell_m if np.isfinite(ground_m) else None,
+    )

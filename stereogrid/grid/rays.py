@@ -19,6 +19,7 @@ def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Ar
     its centre.
     """
     focal, cx, cy, focal_baseline, cell, range_max = camera
+    free = evidence(-1e6, 0.0, model)
     step, cross = np.empty(3, np.int64), np.empty(3)
     stride, at, direction = np.empty(3), np.empty(3, np.int64), np.empty(3)
     for row in range(image.shape[0]):
@@ -47,7 +48,8 @@ def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Ar
                 for other in range(3):
                     along += direction[other] * ((at[other] + 0.5) * cell - pose[other, 3])
                 if cell <= along <= range_max:
-                    _add(lookup, origin, at, evidence((along - measured) / sigma, 0.5 * cell / sigma, model), out)
+                    u, half = (along - measured) / sigma, 0.5 * cell / sigma
+                    _add(lookup, origin, at, free if u <= -half - REACH_SIGMAS else evidence(u, half, model), out)
                 entry = cross[axis]
                 cross[axis] += stride[axis]
                 at[axis] += step[axis]

@@ -123,7 +123,9 @@ class McapWriter:
         try:
             file: BinaryIO = self.path.open(mode)  # type: ignore[assignment]
         except FileExistsError:
-            raise RecordingError(f"{self.path}: exists already; choose another path (in Python: or overwrite=True)") from None
+            raise RecordingError(
+                f"{self.path}: exists already; choose another path (in Python: or overwrite=True)"
+            ) from None
         except OSError as error:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
         return file

@@ -9,20 +9,18 @@ import pytest
 pytest.importorskip("pybullet")
 pytest.importorskip("embreex")
 
-from sim.__main__ import main
+from sim.__main__ import app
+from stereogrid.cli import run as run_command
 from stereogrid.recording.mcap import McapRecording
 
 
-def run(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> object:
+def run(*arguments: str) -> int:
     """The exit code of the command, in this process: starting another one takes seconds."""
-    monkeypatch.setattr(sys, "argv", ["sim", *arguments])
-    with pytest.raises(SystemExit) as end:
-        main()
-    return end.value.code
+    return run_command(app, list(arguments))
 
 
-def test_help_shows_an_example(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(monkeypatch, "record", "--help") == 0
+def test_help_shows_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("record", "--help") == 0
     assert "python -m sim record corridor --out drive.mcap" in " ".join(capsys.readouterr().out.split())
 
 
@@ -48,10 +46,9 @@ def test_bad_input_gets_one_line_and_leaves_no_file(
     arguments: tuple[str, ...],
     message: str,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert run(monkeypatch, "record", *(a.format(out=tmp_path / "drive.mcap") for a in arguments)) == 1
+    assert run("record", *(a.format(out=tmp_path / "drive.mcap") for a in arguments)) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
     assert not list(tmp_path.iterdir())
