@@ -89,7 +89,8 @@ def sum_rays(lookup, origin, pose, camera, image, model, out):
         norm = np.linalg.norm(ray)
         measured_m = focal_baseline / disparity * norm
         sigma_m = measured_m / ratio
-        end_m = min(measured_m + 0.5 * cell_m + REACH_SIGMAS * sigma_m, max_range_m)
+        reach_m = 0.5 * cell_m + REACH_SIGMAS * sigma_m
+        end_m = min(measured_m + reach_m, max_range_m)
         direction = pose[:3, :3] @ ray / norm
         crossings = [0.0]
         for axis in range(3):
@@ -103,6 +104,8 @@ def sum_rays(lookup, origin, pose, camera, image, model, out):
             at = (_row(lookup, origin, cell), *(cell % BLOCK))
             if at[0] >= 0 and cell_m <= along_m <= max_range_m:
                 learnt = gain(along_m, measured_m, sigma_m, cell_m, model)
+                if along_m - measured_m <= -reach_m:
+                    learnt = log_odds(model[0]) + (log_odds(model[2]) if model[3] else -log_odds(model[2]))
                 out[at] = learnt if np.isnan(out[at]) else out[at] + np.float32(learnt)
 
 
