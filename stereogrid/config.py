@@ -25,7 +25,8 @@ else:
 T = TypeVar("T")
 
 TYPICAL_SIGMA_PX = 0.3
-USEFUL_SIGMA_M = 0.15
+USEFUL_SIGMA_M = 0.1
+CELLS_A_RANGE = 80
 
 
 @dataclass(frozen=True)
@@ -59,12 +60,12 @@ class MappingConfig:
     def for_camera(cls, camera: StereoCamera) -> "MappingConfig":
         """Defaults that suit a camera, where a person gives no others.
 
-        Range: where TYPICAL_SIGMA_PX of disparity is USEFUL_SIGMA_M of depth (Eq. 8). Cells: a hundredth of it,
+        Range: where TYPICAL_SIGMA_PX of disparity is USEFUL_SIGMA_M of depth (Eq. 8). Cells: an eightieth of it,
         rounded down to 1, 2 or 5 times a power of ten. Disparities: an eighth of the width, as OpenCV's samples.
         """
         range_m = round(math.sqrt(USEFUL_SIGMA_M * camera.focal_baseline_px_m / TYPICAL_SIGMA_PX), 1)
-        power = 10.0 ** math.floor(math.log10(range_m / 100))
-        cell_m = max(n * power for n in (1, 2, 5) if n * power <= range_m / 100)
+        power = 10.0 ** math.floor(math.log10(range_m / CELLS_A_RANGE))
+        cell_m = max(n * power for n in (1, 2, 5) if n * power <= range_m / CELLS_A_RANGE)
         return cls(
             matcher=MatcherConfig(num_disparities=(camera.width_px // 8 + 15) // 16 * 16),
             model=SensorModel(max_range_m=range_m),

@@ -18,7 +18,11 @@ from .geometry import FloatArray, as_floats
 FORMS = ("corrected", "printed")
 MOTION_RULES = ("rss", "linear")
 REACH_SIGMAS = 3.5
-"""Further than this before the measured surface a cell is plainly free; as far behind it nothing is learnt."""
+"""Further than this before the measured surface a cell is plainly free."""
+REACH_BEHIND_SIGMAS = 1.0
+"""A cell that begins further than this behind it learns nothing: what little Eq. 12 still claims there is not free of
+the claims of the next observations, and adds up to walls many cells thick. (The printed form reaches as far behind as
+before.)"""
 
 
 @dataclass(frozen=True)
@@ -131,9 +135,17 @@ def occupancy_probability(
     return p
 
 
-def kernel_parameters(model: SensorModel) -> tuple[float, float, float, bool]:
-    """(p_free, p_occupied, prior, printed): the model as the Numba kernels take it."""
-    return model.p_free, model.p_occupied, model.prior, model.form == "printed"
+KernelModel = tuple[float, float, float, bool, float, float]
+
+
+def kernel_parameters(model: SensorModel) -> KernelModel:
+    """(p_free, p_occupied, prior, printed, reach before, reach behind [sigmas]): the model as the kernels take it.
+
+    Arguments, not constants of the kernels: Numba's cache does not notice when another module's constant changes.
+    """
+    printed = model.form == "printed"
+    behind = REACH_SIGMAS if printed else REACH_BEHIND_SIGMAS
+    return model.p_free, model.p_occupied, model.prior, printed, REACH_SIGMAS, behind
 
 
 def free_log_odds(model: SensorModel) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ..geometry import Array
-from ..sensor_model import REACH_SIGMAS
+from ..sensor_model import KernelModel
 
 BLOCK = 16
 """Cells along the edge of a block."""
@@ -20,9 +20,9 @@ SQRT_2PI = math.sqrt(2 * math.pi)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def evidence(u: float, half: float, parameters: tuple[float, float, float, bool]) -> float:
+def evidence(u: float, half: float, model: KernelModel) -> float:
     """Log-odds that one reading adds to a cell u sigmas behind the surface, half a cell being `half` sigmas."""
-    p_free, p_occupied, prior, printed = parameters
+    p_free, p_occupied, prior, printed, _, _ = model
     side = p_free if u < 0 else prior
     if printed:
         # Eq. 11 as it stands, k = cell; what exceeds 1 cannot be fused and is cut off just below it.
@@ -38,7 +38,7 @@ def evidence(u: float, half: float, parameters: tuple[float, float, float, bool]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sweep_cells(blocks: Array, pose: Array, camera: Array, image: Array, model: tuple, out: Array) -> None:  # type: ignore[type-arg]
+def sweep_cells(blocks: Array, pose: Array, camera: Array, image: Array, model: KernelModel, out: Array) -> None:
     """Write into out (B, 16, 16, 16) the evidence that the pixel under each cell's centre has for the cell.
 
     blocks (B, 3) int64 block indices; pose (4, 4) T_world_cam; camera: focal, cx, cy, focal * baseline, cell,
@@ -47,7 +47,7 @@ def sweep_cells(blocks: Array, pose: Array, camera: Array, image: Array, model: 
     """
     focal, cx, cy, focal_baseline, cell, range_max = camera
     height, width = image.shape[:2]
-    free = evidence(-1e6, 0.0, model)
+    free, reach, reach_behind = evidence(-1e6, 0.0, model), model[4], model[5]
     for b in range(len(blocks)):
         for i in range(BLOCK):
             x = (blocks[b, 0] * BLOCK + i + 0.5) * cell - pose[0, 3]
@@ -71,15 +71,16 @@ def sweep_cells(blocks: Array, pose: Array, camera: Array, image: Array, model: 
                     u = ratio * (disparity * depth / focal_baseline - 1)
                     # Half a cell in sigmas along the ray: dl = (f b / d) (dd / d) range / depth.
                     half = 0.5 * cell * ratio * disparity * depth / (focal_baseline * math.sqrt(square_range))
-                    reach = half + REACH_SIGMAS
-                    if u <= -reach:
+                    if u <= -half - reach:
                         out[b, i, j, k] = free
-                    elif u < reach:
+                    elif u < half + reach_behind:
                         out[b, i, j, k] = evidence(u, half, model)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def vote_hits(lookup: Array, origin: Array, pose: Array, camera: Array, image: Array, model: tuple, out: Array) -> None:  # type: ignore[type-arg]
+def vote_hits(
+    lookup: Array, origin: Array, pose: Array, camera: Array, image: Array, model: KernelModel, out: Array
+) -> None:
     """Let each match vote for the cell that its point falls in: the strongest vote of a cell replaces weaker evidence.
 
     A near cell covers many pixels and the sweep reads one; a ray that grazes a floor may pass over the one

@@ -6,12 +6,14 @@ import numpy as np
 from numba import njit
 
 from ..geometry import Array
-from ..sensor_model import REACH_SIGMAS
+from ..sensor_model import KernelModel
 from .kernels import BLOCK, evidence
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Array, model: tuple, out: Array) -> None:  # type: ignore[type-arg]
+def sum_rays(
+    lookup: Array, origin: Array, pose: Array, camera: Array, image: Array, model: KernelModel, out: Array
+) -> None:
     """Add to out (B, 16, 16, 16), NaN = untouched, the evidence of every valid pixel for every cell on its ray.
 
     Arguments as in kernels.vote_hits. Cells are visited in order along the ray (Amanatides and Woo 1987), up to
@@ -19,7 +21,7 @@ def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Ar
     its centre.
     """
     focal, cx, cy, focal_baseline, cell, range_max = camera
-    free = evidence(-1e6, 0.0, model)
+    free, reach, reach_behind = evidence(-1e6, 0.0, model), model[4], model[5]
     step, cross = np.empty(3, np.int64), np.empty(3)
     stride, at, direction = np.empty(3), np.empty(3, np.int64), np.empty(3)
     for row in range(image.shape[0]):
@@ -38,7 +40,7 @@ def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Ar
                 stride[axis] = cell / abs(direction[axis])
                 ahead = (at[axis] + (direction[axis] > 0)) * cell - pose[axis, 3]
                 cross[axis] = ahead / direction[axis] if direction[axis] != 0 else np.inf
-            end = min(measured + 0.5 * cell + REACH_SIGMAS * sigma, range_max)
+            end = min(measured + 0.5 * cell + reach_behind * sigma, range_max)
             entry = 0.0
             while entry < end:
                 axis = 0 if cross[0] < cross[1] else 1
@@ -49,7 +51,7 @@ def sum_rays(lookup: Array, origin: Array, pose: Array, camera: Array, image: Ar
                     along += direction[other] * ((at[other] + 0.5) * cell - pose[other, 3])
                 if cell <= along <= range_max:
                     u, half = (along - measured) / sigma, 0.5 * cell / sigma
-                    _add(lookup, origin, at, free if u <= -half - REACH_SIGMAS else evidence(u, half, model), out)
+                    _add(lookup, origin, at, free if u <= -half - reach else evidence(u, half, model), out)
                 entry = cross[axis]
                 cross[axis] += stride[axis]
                 at[axis] += step[axis]

@@ -85,7 +85,7 @@ def command(*arguments, cwd):
 @pytest.fixture(scope="module")
 def first_run(drive, tmp_path_factory):
     cwd = tmp_path_factory.mktemp("work")
-    done = command("map", drive, "--out", "mine.sgrid", "--cell", "0.04", cwd=cwd)
+    done = command("map", drive, "--out", "mine.sgrid", "--cell", "0.04", "--range", "3", cwd=cwd)
     assert done.returncode == 0, done.stderr
     return cwd, done
 

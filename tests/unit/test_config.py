@@ -119,12 +119,12 @@ def test_sections_within_sections_are_named_by_their_whole_path(tmp_path):
 
 def test_defaults_suit_the_minoru():
     config = MappingConfig.for_camera(MINORU)
-    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.05, 5.0, 80)
+    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.05, 4.1, 80)
 
 
 def test_defaults_suit_kitti():
     config = MappingConfig.for_camera(KITTI)
-    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.1, 13.8, 160)
+    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.1, 11.3, 160)
 
 
 @given(st.floats(100, 5000), st.floats(0.01, 3), st.integers(32, 4000))
@@ -132,9 +132,9 @@ def test_defaults_of_any_camera_are_within_their_rule(focal_px, baseline_m, widt
     camera = StereoCamera(focal_px, width_px / 2, 100, baseline_m, width_px, 200)
     config = MappingConfig.for_camera(camera)
     cell_m, range_m = config.grid.cell_m, config.model.max_range_m
-    # Eq. 8: 0.3 px are 15 cm of depth at the largest range, which is printed with one digit.
-    assert range_m == pytest.approx((0.15 * focal_px * baseline_m / 0.3) ** 0.5, abs=0.0501)
-    assert range_m / 250 * (1 - 1e-9) <= cell_m <= range_m / 100 * (1 + 1e-9)
+    # Eq. 8: 0.3 px are 10 cm of depth at the largest range, which is printed with one digit.
+    assert range_m == pytest.approx((0.1 * focal_px * baseline_m / 0.3) ** 0.5, abs=0.0501)
+    assert range_m / 200 * (1 - 1e-9) <= cell_m <= range_m / 80 * (1 + 1e-9)
     assert f"{cell_m:e}"[0] in "125"
     assert float(f"{cell_m:.0e}") == cell_m
     assert config.matcher.num_disparities % 16 == 0

@@ -1,5 +1,7 @@
 """Each kernel agrees with its NumPy twin, whatever the pose, the holes and the form of the model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -109,7 +111,7 @@ def test_adding_evidence_agrees_with_its_twin_to_the_last_bit(seed, clamp):
 @given(u=st.floats(-6, 6), half=st.floats(0.01, 20), model=models)
 @settings(derandomize=True)
 def test_the_evidence_of_one_reading_is_the_sensor_models_probability_fused(form, u, half, model):
-    parameters = (*kernel_parameters(model)[:3], form == "printed")
+    parameters = kernel_parameters(replace(model, form=form))
     # A cell of 2 half sigmas, a sigma being one metre, ten metres away.
     expected = twins.gain(np.float64(10 + u), 10.0, 1.0, 2 * half, parameters)
     assert kernels.evidence.py_func(u, half, parameters) == pytest.approx(float(expected), rel=1e-9, abs=1e-9)

@@ -1,18 +1,18 @@
 """NumPy twins of the grid's Numba kernels: the same meaning, written in metres from the formulas of sensor_model.
 
 They take the kernels' arguments and write into `out` as the kernels do. Nothing here is shared with the kernels
-but the size of a block and REACH_SIGMAS.
+but the size of a block.
 """
 
 import numpy as np
 
 from stereogrid.grid.kernels import BLOCK
-from stereogrid.sensor_model import REACH_SIGMAS, SensorModel, log_odds, occupancy_probability
+from stereogrid.sensor_model import SensorModel, log_odds, occupancy_probability
 
 
 def gain(range_m, measured_m, sigma_m, cell_m, parameters):
     """Log-odds that a reading adds to cells at range_m on its ray. Eqs. 3, 11 and 12, corrected or in print."""
-    p_free, p_occupied, prior, printed = parameters
+    p_free, p_occupied, prior, printed = parameters[:4]
     if not printed:
         model = SensorModel(p_free=p_free, p_occupied=p_occupied, prior=prior)
         p = occupancy_probability(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
@@ -46,12 +46,12 @@ def sweep_cells(blocks, pose, camera, image, model, out):
     measured_m = focal_baseline / disparity * range_m[seen] / depth[seen]
     sigma_m = measured_m / ratio
     behind_m = range_m[seen] - measured_m
-    reach_m = 0.5 * cell_m + REACH_SIGMAS * sigma_m
+    reach_m = 0.5 * cell_m + model[4] * sigma_m
     learnt = gain(range_m[seen], measured_m, sigma_m, cell_m, model)
     prior = model[2]
     learnt[behind_m <= -reach_m] = log_odds(model[0]) + (log_odds(prior) if model[3] else -log_odds(prior))
     found = out[seen]
-    written = behind_m < reach_m
+    written = behind_m < 0.5 * cell_m + model[5] * sigma_m
     found[written] = learnt[written]
     out[seen] = found
 
@@ -89,8 +89,8 @@ def sum_rays(lookup, origin, pose, camera, image, model, out):
         norm = np.linalg.norm(ray)
         measured_m = focal_baseline / disparity * norm
         sigma_m = measured_m / ratio
-        reach_m = 0.5 * cell_m + REACH_SIGMAS * sigma_m
-        end_m = min(measured_m + reach_m, max_range_m)
+        reach_m = 0.5 * cell_m + model[4] * sigma_m
+        end_m = min(measured_m + 0.5 * cell_m + model[5] * sigma_m, max_range_m)
         direction = pose[:3, :3] @ ray / norm
         crossings = [0.0]
         for axis in range(3):
