@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from ..errors import InvalidInputError
 from ..geometry import Array, FloatArray
@@ -46,6 +47,10 @@ def slice_figure(
     )
     figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
     _overlays(axes, path_m, truth_segments_m)
+    # Below the axes: inside them it would hide a part of the map.
+    unknown = Patch(facecolor=UNKNOWN_COLOUR, edgecolor="0.6", label="unknown")
+    handles = [*axes.get_legend_handles_labels()[0], unknown]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
     axes.set(xlabel="x (world) [m]", ylabel="y (world) [m]", title=title or f"Slice at z = {height_m:.2f} m")
     return figure
 
@@ -70,5 +75,3 @@ def _overlays(axes: Axes, path_m: Array | None, truth_segments_m: Array | None) 
     if path_m is not None:
         axes.plot(path_m[:, 0], path_m[:, 1], color=PATH_COLOUR, linewidth=1.2, label="camera path")
         axes.plot(*path_m[0, :2], "o", color=PATH_COLOUR, markersize=4)
-    if path_m is not None or truth_segments_m is not None:
-        axes.legend(loc="best", fontsize=8, framealpha=0.9)
