@@ -32,7 +32,7 @@ def slice_figure(
     """
     x, y, p = _sample(grid, height_m)
     span = (x[-1] - x[0]) / max(y[-1] - y[0], 1e-9)
-    figure = Figure(figsize=(9, float(np.clip(9 / span, 3.0, 9)) + 0.8), layout="constrained")
+    figure = Figure(figsize=(9, float(np.clip(7.2 / span, 2.0, 9)) + 1.2), layout="constrained")
     axes = figure.add_subplot()
     half = (x[1] - x[0]) / 2
     axes.set_facecolor(UNKNOWN_COLOUR)
