@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test test-slow bench lint types layers format wheel-check clean
+.PHONY: demo test lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -10,13 +10,7 @@ demo: .venv/ready
 	$(PYTHON) -m experiments corridor
 
 test: .venv/ready
-	$(PYTHON) -m pytest -m "not slow"
-
-test-slow: .venv/ready
-	$(PYTHON) -m pytest -m slow
-
-bench: .venv/ready
-	$(PYTHON) -m tests.bench
+	$(PYTHON) -m pytest
 
 lint: .venv/ready
 	.venv/bin/ruff check .
