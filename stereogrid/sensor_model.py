@@ -4,7 +4,6 @@ Corrected where the paper's print cannot be right; `as_printed.py` keeps the lit
 shows the two side by side.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -146,8 +145,3 @@ def kernel_parameters(model: SensorModel) -> KernelModel:
     printed = model.form == "printed"
     behind = REACH_SIGMAS if printed else REACH_BEHIND_SIGMAS
     return model.p_free, model.p_occupied, model.prior, printed, REACH_SIGMAS, behind
-
-
-def free_log_odds(model: SensorModel) -> float:
-    """What a cell well in front of the measured surface gains: logit p_free - logit p0."""
-    return math.log(model.p_free / (1 - model.p_free)) - math.log(model.prior / (1 - model.prior))

@@ -20,6 +20,9 @@ from .view import blocks_in_view, view_volume_m3
 FUSIONS = ("cell", "sum_of_rays")
 """cell: one update a cell an observation. sum_of_rays: the paper read literally, every ray adds."""
 
+NOWHERE = 2**52
+"""An index beyond every cell."""
+
 
 class OccupancyGrid:
     """Occupancy probabilities of cubic cells of cell_m; cell (i, j, k) spans [i s, (i + 1) s) x ... in world.
@@ -127,15 +130,18 @@ class OccupancyGrid:
         return int(np.count_nonzero(self.blocks.counts()))
 
     def probability(self, points_m: ArrayLike) -> FloatArray:
-        """p(occupied) (N,) at points (N, 3) in world [m]; NaN where the cell was never updated."""
-        points = as_floats(points_m).reshape(-1, 3)
-        values, counts = self.blocks.at(np.floor(points / self.cell_m).astype(np.int64))
+        """p(occupied) (N,) at points (N, 3) in world [m]; NaN where the cell was never updated, or at NaN."""
+        values, counts = self.blocks.at(self._cells_at(points_m))
         return np.where(counts > 0, probability(values), np.nan)
 
     def n_updates(self, points_m: ArrayLike) -> Array:
         """How often the cells at points (N, 3) in world [m] were updated, (N,) int."""
-        points = as_floats(points_m).reshape(-1, 3)
-        return self.blocks.at(np.floor(points / self.cell_m).astype(np.int64))[1]
+        return self.blocks.at(self._cells_at(points_m))[1]
+
+    def _cells_at(self, points_m: ArrayLike) -> Array:
+        """Indices (N, 3) int64 of the cells that hold points (N, 3) [m]; NaN and infinity get one that is never held."""
+        cells = np.floor(as_floats(points_m).reshape(-1, 3) / self.cell_m)
+        return np.where(np.abs(cells) < NOWHERE, cells, NOWHERE).astype(np.int64)
 
     def known_cells(self) -> tuple[Array, FloatArray]:
         """Indices (N, 3) int64 and probabilities (N,) of all cells ever updated."""

@@ -9,10 +9,11 @@ from scipy.special import ndtr
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import InvalidInputError
 from stereogrid.sensor_model import (
+    REACH_BEHIND_SIGMAS,
+    REACH_SIGMAS,
     SensorModel,
     depth_interval_m,
     depth_sigma_m,
-    free_log_odds,
     fuse,
     kernel_parameters,
     log_odds,
@@ -200,7 +201,7 @@ def test_eq12_is_free_well_in_front_and_the_prior_well_behind(model, sigma_m, ce
     assert front == pytest.approx(model.p_free, abs=1e-9)
     assert behind == pytest.approx(model.prior, abs=1e-9)
     assert fuse(0.0, behind, model.prior) == pytest.approx(0, abs=1e-6)
-    assert fuse(0.0, front, model.prior) == pytest.approx(free_log_odds(model), abs=1e-6)
+    assert fuse(0.0, front, model.prior) == pytest.approx(log_odds(model.p_free) - log_odds(model.prior), abs=1e-6)
 
 
 @given(models, sigmas_m, cells_m)
@@ -282,6 +283,5 @@ def test_a_sensor_model_that_cannot_be_is_refused_with_the_choices(changes, reas
 
 def test_the_kernels_get_the_numbers_of_the_model():
     model = SensorModel(p_free=0.2, prior=0.4, p_occupied=0.8, form="printed")
-    assert kernel_parameters(model) == (0.2, 0.8, 0.4, True)
-    assert not kernel_parameters(SensorModel())[3]
-    assert free_log_odds(model) == pytest.approx(np.log(0.25) - np.log(2 / 3))
+    assert kernel_parameters(model) == (0.2, 0.8, 0.4, True, REACH_SIGMAS, REACH_SIGMAS)
+    assert kernel_parameters(SensorModel())[3:] == (False, REACH_SIGMAS, REACH_BEHIND_SIGMAS)

@@ -155,6 +155,14 @@ def test_the_printed_form_sinks_the_cells_behind_a_surface_where_the_prior_is_no
 # What the map answers
 
 
+@pytest.mark.filterwarnings("error")
+def test_points_that_are_nowhere_are_unknown():
+    grid = mapped([FORWARD], [wall(1.5, 0.3)])
+    nowhere = [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf], [1e300, 0, 0], [-1e17, 0, 0]]
+    assert np.isnan(grid.probability(nowhere)).all()
+    assert not grid.n_updates(nowhere).any()
+
+
 @given(seed=seeds, threshold=st.sampled_from([0.0, 0.2, 0.5, 0.7, 0.95]))
 @settings(max_examples=10, deadline=None, derandomize=True)
 def test_known_cells_occupied_centres_and_probability_agree(seed, threshold):
