@@ -139,7 +139,7 @@ class OccupancyGrid:
         return self.blocks.at(self._cells_at(points_m))[1]
 
     def _cells_at(self, points_m: ArrayLike) -> Array:
-        """Indices (N, 3) int64 of the cells that hold points (N, 3) [m]; NaN and infinity get one that is never held."""
+        """Indices (N, 3) int64 of the cells that hold points (N, 3) [m]; NaN and infinity get one never held."""
         cells = np.floor(as_floats(points_m).reshape(-1, 3) / self.cell_m)
         return np.where(np.abs(cells) < NOWHERE, cells, NOWHERE).astype(np.int64)
 
