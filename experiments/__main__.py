@@ -3,18 +3,16 @@
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
 from stereogrid.cli import run as run_command
-from stereogrid.config import load_config
 
-from . import corridor as corridor_experiment
-from . import pictures as picture_experiment
-from .parallel import rich_stage
+if TYPE_CHECKING:
+    from .corridor import Outcome
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
@@ -31,12 +29,19 @@ def corridor(
     runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
 ) -> None:
     """Drive down a simulated corridor, map it by stereo, score the map against the truth."""
+    # Imported here for the reasons that stereogrid.cli gives.
+    from stereogrid.config import load_config
+
+    from .corridor import HEADLINE, CorridorConfig
+    from .corridor import run as run_corridor
+    from .parallel import rich_stage
+
     start_s = time.perf_counter()
-    chosen = load_config(corridor_experiment.CorridorConfig, config) if config else corridor_experiment.CorridorConfig()
+    chosen = load_config(CorridorConfig, config) if config else CorridorConfig()
     command = " ".join(["python -m experiments", *sys.argv[1:]])
-    folder, outcomes = corridor_experiment.run(chosen, rich_stage, runs=runs, command=command, recording=recording)
+    folder, outcomes = run_corridor(chosen, rich_stage, runs=runs, command=command, recording=recording)
     console = Console()
-    console.print(_table(outcomes))
+    console.print(_table(outcomes, HEADLINE))
     console.print(
         f"{folder / 'report.html'} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True
     )
@@ -48,13 +53,15 @@ def pictures(
     out: Annotated[Path, typer.Option(help="Folder of the pictures.")] = Path("docs/images"),
 ) -> None:
     """Make the README's picture anew."""
-    picture_experiment.corridor_picture(run, out / "corridor.png")
+    from .pictures import corridor_picture
+
+    corridor_picture(run, out / "corridor.png")
 
 
-def _table(outcomes: dict[str, corridor_experiment.Outcome]) -> Table:
+def _table(outcomes: "dict[str, Outcome]", headline: tuple[str, ...]) -> Table:
     table = Table("score", "unit", *outcomes, box=None)
     units = {score.name: score.unit for score in next(iter(outcomes.values())).scores}
-    for name in corridor_experiment.HEADLINE:
+    for name in headline:
         values = (f"{outcome.value(name):.3f}" for outcome in outcomes.values())
         table.add_row(name, "" if units[name] == "1" else units[name], *values)
     return table

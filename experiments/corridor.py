@@ -29,7 +29,7 @@ from stereogrid.scoring import Score, scores_to_dict
 from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import SensorModel
 
-from .parallel import Stage, counted, in_parallel
+from .parallel import Stage, Step, counted, in_parallel
 
 IDEAL, NOISY, TRUE_DEPTH, SHUFFLED = "ideal", "noisy", "true depth", "shuffled poses"
 HEADLINE = (
@@ -60,7 +60,7 @@ class CorridorConfig:
 
     seed paints the world, noise_seed draws the noise of cameras and odometry. every_m: distance between two
     pairs [m]. distance_m: how much of the path is driven, 0 = all [m]. score_range_m: the visible set reaches so
-    far [m]. image_noise: a preset of sim.noise.
+    far [m]. image_noise: a preset of sim.noise. noisy_motion_error: eps of the noisy arm, in place of mapping's.
     """
 
     seed: int = 0
@@ -81,7 +81,7 @@ class CorridorConfig:
             grid=GridConfig(cell_m=0.05),
         )
     )
-    motion_error: MotionError = field(default_factory=lambda: MotionError(a_m=1e-5))
+    noisy_motion_error: MotionError = field(default_factory=lambda: MotionError(a_m=1e-5))
 
     def __post_init__(self) -> None:
         image_noise(self.image_noise)
@@ -115,9 +115,9 @@ def run(
         save_config(config, folder / "config.toml")
         drive = reused or open_recording(record(config, folder / "drive.mcap", stage))
         truth, outcomes = score_arms(drive, config, stage)
-        with stage("drawing", 1):
+        with stage("drawing", 5) as step:
             facts = {"command": command, "recording": str(recording or "drive.mcap"), "pairs": str(len(drive))}
-            write_results(folder, drive, truth, outcomes, facts)
+            write_results(folder, drive, truth, outcomes, facts=facts, step=step)
     return finished_path(folder), outcomes
 
 
@@ -143,7 +143,7 @@ def arms(drive: Recording, config: CorridorConfig, track: Track) -> dict[str, Ca
     )
     true, shuffled = TruePoses(drive), ShuffledPoses(TruePoses(drive), config.noise_seed)
     perfect = partial(build_map, config=config.mapping, track=track)
-    moving = replace(config.mapping, motion_error=config.motion_error)
+    moving = replace(config.mapping, motion_error=config.noisy_motion_error)
     return {
         IDEAL: partial(perfect, true),
         NOISY: partial(build_map, noisy, moving, track),
@@ -156,7 +156,9 @@ def true_disparity(camera: StereoCamera, observation: Observation) -> Disparity:
     """The disparity of the true depth (H, W)."""
     if observation.truth is None or observation.truth.depth_m is None:
         raise RecordingError("the recording carries no true depth, so the ceiling cannot be mapped")
-    disparity_px = camera.disparity_px(observation.truth.depth_m).astype(np.float32)
+    depth_m = observation.truth.depth_m
+    disparity_px = camera.disparity_px(np.where(depth_m > 0, depth_m, np.nan)).astype(np.float32)
+    disparity_px[disparity_px == 0] = np.nan  # infinitely far
     return Disparity(disparity_px, np.full_like(disparity_px, TRUE_SIGMA_PX))
 
 
@@ -181,13 +183,19 @@ def score_arms(drive: Recording, config: CorridorConfig, stage: Stage) -> tuple[
 
 def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
     """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
-    among = obstacles.score(mapped.grid, surface=False)
+    among = obstacles.score(mapped.grid, prior=mapped.grid.model.prior, surface=False)
     named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
-    return [*truth.score(mapped.grid), *named]
+    return [*truth.score(mapped.grid, prior=mapped.grid.model.prior), *named]
 
 
 def write_results(
-    folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome], facts: Mapping[str, str]
+    folder: Path,
+    drive: Recording,
+    truth: MapTruth,
+    outcomes: Mapping[str, Outcome],
+    *,
+    facts: Mapping[str, str],
+    step: Step,
 ) -> None:
     """Maps, metrics, figures and the report of the run, into its folder."""
     for name, outcome in outcomes.items():
@@ -200,19 +208,23 @@ def write_results(
         summary="A simulated drive down a corridor, mapped by stereo and scored against the true mesh, on the cells "
         "that the cameras could see.",
         arms={name: outcome.scores for name, outcome in outcomes.items()},
-        figures=draw(folder, drive, truth, outcomes),
+        figures=draw(folder, drive, truth, outcomes, step=step),
         facts=facts,
         headline=HEADLINE,
         meanings={f"obstacle_{name}": f"{name} of the cells from {low} to {high} m" for name in OBSTACLE_SCORES},
     )
 
 
-def draw(folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome]) -> list[ReportFigure]:
-    """The figures of the main arm, and its reliability beside the noisy one's."""
+def draw(
+    folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome], *, step: Step
+) -> list[ReportFigure]:
+    """The figures of the main arm, and its reliability beside the noisy one's; step after each of the five."""
     main = outcomes[IDEAL].mapped
-    figures = draw_map(main, drive, folder, truth_segments_m=truth.section_m(float(np.median(main.path_m[:, 2]))))
+    section_m = truth.section_m(float(np.median(main.path_m[:, 2])))
+    figures = draw_map(main, drive, folder, counted(step), truth_segments_m=section_m)
     for name in (IDEAL, NOISY):
         figure = reliability_figure(truth.reliability(outcomes[name].mapped.grid), title=f"Reliability, {name}")
         path = save_figure(figure, folder / f"reliability-{name}.png")
         figures.append(ReportFigure(path, f"Are the probabilities of the {name} arm frequencies?"))
+        step()
     return figures

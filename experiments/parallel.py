@@ -8,6 +8,8 @@ from typing import Any, Protocol, TypeVar
 from rich.console import Console
 from rich.progress import Progress
 
+from stereogrid.mapping_run import Track
+
 WORKERS = 2
 Item = TypeVar("Item")
 
@@ -26,10 +28,10 @@ Stage = Callable[[str, float], AbstractContextManager[Step]]
 """stage("mapping", 5) shows a bar of five steps for as long as it is open."""
 
 
-def counted(step: Step) -> Callable[[Iterable[Item], int], Iterator[Item]]:
+def counted(step: Step) -> Track:
     """A tracker of items that advances step once an item."""
 
-    def track(items: Iterable[Item], _total: int) -> Iterator[Item]:
+    def track(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:  # noqa: ARG001
         for item in items:
             yield item
             step()

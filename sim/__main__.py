@@ -8,13 +8,9 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from stereogrid.camera import StereoCamera
 from stereogrid.cli import run
 
-from .record import record_drive
-from .rig import MINORU, StereoRig, mount
-
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 @app.callback()
@@ -28,15 +24,21 @@ def record(
     out: Annotated[Path, typer.Option(help="The MCAP file to write.")],
     seed: Annotated[int, typer.Option(help="Paints and furnishes the world.")] = 0,
     every: Annotated[float, typer.Option(help="Distance between two pairs [m].")] = 0.2,
-    width: Annotated[int, typer.Option(help="Image width [px].")] = MINORU.width_px,
-    height: Annotated[int, typer.Option(help="Image height [px].")] = MINORU.height_px,
-    baseline: Annotated[float, typer.Option(help="Distance of the two cameras [m].")] = MINORU.baseline_m,
+    width: Annotated[int, typer.Option(help="Image width [px].")] = 640,
+    height: Annotated[int, typer.Option(help="Image height [px].")] = 480,
+    baseline: Annotated[float, typer.Option(help="Distance of the two cameras [m].")] = 0.06,
     focal: Annotated[float | None, typer.Option(help="Focal length [px]; by default 42 degrees of width.")] = None,
     camera_height: Annotated[float, typer.Option(help="Height of the lenses [m].")] = 0.40,
     pitch: Annotated[float, typer.Option(help="Look down by this much [rad].")] = 0.0,
     distance: Annotated[float | None, typer.Option(help="Stop after this much of the path [m].")] = None,
 ) -> None:
     """Drive through a world and record stereo pairs, odometry and the truth as an MCAP file."""
+    # Imported here for the reasons that stereogrid.cli gives.
+    from stereogrid.camera import StereoCamera
+
+    from .record import record_drive
+    from .rig import MINORU, StereoRig, mount
+
     camera = StereoCamera(
         focal_px=focal if focal is not None else MINORU.focal_px * width / MINORU.width_px,
         cx_px=(width - 1) / 2,

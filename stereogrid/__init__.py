@@ -11,16 +11,20 @@ for observation in recording:
 grid.probability(points_m)
 """
 
-from .camera import Rectification, StereoCamera
-from .config import MappingConfig
-from .errors import StereogridError
-from .grid import OccupancyGrid
-from .mapper import Mapper
-from .matching import matcher
-from .motion import MotionError, NoisyOdometry, OdometryNoise
-from .observation import Disparity, Matcher, Observation, Odometry, Recording, Source, Truth
-from .recording import open_recording
-from .sensor_model import SensorModel
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .camera import Rectification, StereoCamera
+    from .config import MappingConfig
+    from .errors import StereogridError
+    from .grid import OccupancyGrid
+    from .mapper import Mapper
+    from .matching import matcher
+    from .motion import MotionError, NoisyOdometry, OdometryNoise
+    from .observation import Disparity, Matcher, Observation, Odometry, Recording, Source, Truth
+    from .recording import open_recording
+    from .sensor_model import SensorModel
 
 __version__ = "0.1.0"
 
@@ -45,3 +49,28 @@ __all__ = [
     "matcher",
     "open_recording",
 ]
+
+_HOMES = {
+    "camera": ("Rectification", "StereoCamera"),
+    "config": ("MappingConfig",),
+    "errors": ("StereogridError",),
+    "grid": ("OccupancyGrid",),
+    "mapper": ("Mapper",),
+    "matching": ("matcher",),
+    "motion": ("MotionError", "NoisyOdometry", "OdometryNoise"),
+    "observation": ("Disparity", "Matcher", "Observation", "Odometry", "Recording", "Source", "Truth"),
+    "recording": ("open_recording",),
+    "sensor_model": ("SensorModel",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for (PEP 562): Numba and OpenCV together take seconds."""
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f".{home}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

@@ -30,7 +30,7 @@ class StereoCamera:
     height_px: int
 
     def __post_init__(self) -> None:
-        for name in ("focal_px", "baseline_m", "width_px", "height_px"):
+        for name in ("width_px", "height_px", "focal_px", "baseline_m"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise InvalidInputError(f"{name} must be positive and finite, not {value}")
@@ -124,8 +124,10 @@ class StereoCamera:
 
 def _projection(P: ArrayLike, side: str) -> FloatArray:
     matrix = as_floats(P)
-    if matrix.shape != (3, 4) or not np.isfinite(matrix).all():
-        raise InvalidInputError(f"the {side} projection matrix must be (3, 4) and finite, not {matrix.shape}")
+    if matrix.shape != (3, 4):
+        raise InvalidInputError(f"the {side} projection matrix must be (3, 4), not {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise InvalidInputError(f"the {side} projection matrix contains NaN or infinity")
     return matrix
 
 

@@ -1,25 +1,27 @@
 """The `stereogrid` command. The one place where a StereogridError becomes one line and exit code 1."""
 
+import signal
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
-import numpy as np
 import typer
 from rich.console import Console
+from rich.progress import Progress
 from rich.progress import track as rich_track
 from rich.table import Table
 
-from . import mapping_run
-from .config import MappingConfig, load_config, save_config
 from .errors import InvalidInputError, StereogridError
-from .grid import OccupancyGrid
-from .recording import TruePoses, open_recording, poses
-from .scoring import Score
-from .scoring.score import DIMENSIONLESS
-from .scoring.truth import MapTruth
+
+if TYPE_CHECKING:
+    from .config import MappingConfig
+    from .scoring import Score
+
+# What takes seconds to import (Numba, OpenCV, matplotlib) is imported by the commands that need it: --help and errors
+# come at once, and Ctrl-C finds run() in place to end the command.
 
 app = typer.Typer(
     name="stereogrid",
@@ -51,27 +53,35 @@ def map_command(
     runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
 ) -> None:
     """Map a recording: runs/<stamp>-<name>/ gets the map, figures, metrics.json, config.toml and report.html."""
+    from .config import MappingConfig, load_config
+    from .mapping_run import map_recording
+    from .recording import TruePoses, open_recording
+
     source = open_recording(recording)
     if pose_source not in ("odometry", "truth"):
         raise InvalidInputError(f"--poses must be odometry or truth, not {pose_source!r}")
     chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
     chosen = _overridden(chosen, matcher, num_disparities, cell, max_range)
-    result = mapping_run.map_recording(
+    result = map_recording(
         TruePoses(source) if pose_source == "truth" else source,
         chosen,
         name=recording.resolve().stem,
         runs=runs,
         out=out,
         command=" ".join(["stereogrid", *sys.argv[1:]]),
-        track=lambda items, total: track(items, "mapping", total),
+        track=track,
     )
     _print_scores(result.scores)
     console.print(f"{result.grid!r}\n{result.folder}", highlight=False, soft_wrap=True)
 
 
 def _overridden(
-    config: MappingConfig, matcher: str | None, num_disparities: int | None, cell: float | None, max_range: float | None
-) -> MappingConfig:
+    config: "MappingConfig",
+    matcher: str | None,
+    num_disparities: int | None,
+    cell: float | None,
+    max_range: float | None,
+) -> "MappingConfig":
     """config with the options that were given on the command line."""
     if matcher is not None:
         config = replace(config, matcher=replace(config.matcher, name=matcher))
@@ -87,6 +97,11 @@ def _overridden(
 @app.command(epilog="Example: stereogrid info drive.mcap")
 def info(recording: RecordingPath) -> None:
     """Say what a recording or a map holds."""
+    import numpy as np
+
+    from .grid import OccupancyGrid
+    from .recording import open_recording, poses
+
     if recording.suffix == ".sgrid":
         console.print(repr(OccupancyGrid.load(recording)), highlight=False, soft_wrap=True)
         return
@@ -111,14 +126,25 @@ def score(
     max_range: Annotated[float, typer.Option("--range", help="Score cells seen within this range [m].")] = 5.0,
 ) -> None:
     """Score a map against the true mesh and poses that a simulated recording carries. Needs the extra `score`."""
+    from .grid import OccupancyGrid
+    from .recording import open_recording
+    from .scoring.truth import MapTruth
+
     loaded = OccupancyGrid.load(grid)
-    truth = MapTruth.of_recording(open_recording(recording), loaded.cell_m, max_range_m=max_range)
-    _print_scores(truth.score(loaded))
+    source = open_recording(recording)
+    with _bar("scoring") as show:
+        truth = MapTruth.of_recording(
+            source, loaded.cell_m, max_range_m=max_range, progress=lambda done, total: show(0.6 * done / total)
+        )
+        scores = truth.score(loaded, prior=loaded.model.prior)
+    _print_scores(scores)
 
 
 @app.command("config", epilog="Example: stereogrid config my.toml")
 def config_command(path: Annotated[Path, typer.Argument(help="Where to write it.")]) -> None:
     """Write a config.toml with every parameter at its default."""
+    from .config import MappingConfig, save_config
+
     save_config(MappingConfig(), path)
 
 
@@ -128,7 +154,17 @@ def track(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:
     yield from rich_track(items, what, total, console=progress_console, transient=True, disable=disable)
 
 
-def _print_scores(scores: Iterable[Score]) -> None:
+@contextmanager
+def _bar(what: str) -> Iterator[Callable[[float], None]]:
+    """A bar that shows the share, 0 to 1, that the yielded function is called with."""
+    with Progress(console=progress_console, transient=True, disable=not progress_console.is_terminal) as progress:
+        task = progress.add_task(what, total=1.0)
+        yield lambda share: progress.update(task, completed=share)
+
+
+def _print_scores(scores: "Iterable[Score]") -> None:
+    from .scoring.score import DIMENSIONLESS
+
     table = Table("score", "value", "unit", "n", box=None)
     for row in scores:
         unit = "" if row.unit == DIMENSIONLESS else row.unit
@@ -137,7 +173,11 @@ def _print_scores(scores: Iterable[Score]) -> None:
 
 
 def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
-    """Run a typer command; errors that the user can put right become one line on stderr. The exit code."""
+    """Run a typer command; errors that the user can put right become one line on stderr. The exit code.
+
+    An interrupt, or a request to terminate, unwinds the command, so that nothing half-written stays.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         command(args=arguments)
     except StereogridError as error:

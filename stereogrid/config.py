@@ -63,13 +63,13 @@ class MappingConfig:
         Range: where TYPICAL_SIGMA_PX of disparity is USEFUL_SIGMA_M of depth (Eq. 8). Cells: an eightieth of it,
         rounded down to 1, 2 or 5 times a power of ten. Disparities: an eighth of the width, as OpenCV's samples.
         """
-        range_m = round(math.sqrt(USEFUL_SIGMA_M * camera.focal_baseline_px_m / TYPICAL_SIGMA_PX), 1)
+        range_m = float(f"{math.sqrt(USEFUL_SIGMA_M * camera.focal_baseline_px_m / TYPICAL_SIGMA_PX):.3g}")
         power = 10.0 ** math.floor(math.log10(range_m / CELLS_A_RANGE))
         cell_m = max(n * power for n in (1, 2, 5) if n * power <= range_m / CELLS_A_RANGE)
         return cls(
             matcher=MatcherConfig(num_disparities=(camera.width_px // 8 + 15) // 16 * 16),
             model=SensorModel(max_range_m=range_m),
-            grid=GridConfig(cell_m=round(cell_m, 6)),
+            grid=GridConfig(cell_m=float(f"{cell_m:.1g}")),
         )
 
     def build_mapper(self, camera: StereoCamera) -> Mapper:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Protocol, TypeVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,7 +21,13 @@ from .runs import finished_path, run_folder
 from .scoring import Score, scores_to_dict
 from .scoring.ground import camera_height
 
-Track = Callable[[Iterable[Observation], int], Iterator[Observation]]
+Item = TypeVar("Item")
+
+
+class Track(Protocol):
+    """Yields items and shows how many of total are done; `what` says what is being done to them."""
+
+    def __call__(self, items: Iterable[Item], what: str, total: int) -> Iterator[Item]: ...
 
 
 @dataclass(frozen=True)
@@ -52,7 +58,7 @@ class MappingResult:
     scores: list[Score]
 
 
-def untracked(items: Iterable[Observation], total: int) -> Iterator[Observation]:  # noqa: ARG001
+def untracked(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:  # noqa: ARG001
     """No progress bar."""
     yield from items
 
@@ -70,7 +76,7 @@ def build_map(
     """
     mapper = config.build_mapper(recording.camera)
     poses, densities, sample = [], [], None
-    for n, observation in enumerate(track(recording, len(recording))):
+    for n, observation in enumerate(track(recording, "mapping", len(recording))):
         if disparity_of is None:
             disparity = mapper.step(observation)
         else:
@@ -114,7 +120,7 @@ def map_recording(
             f"Map of {name}",
             summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
             arms={"map": scores},
-            figures=draw_map(mapped, recording, folder),
+            figures=draw_map(mapped, recording, folder, track),
             facts={"command": command, "map sha256": mapped.grid.sha256()},
         )
         if out is not None:
@@ -122,7 +128,14 @@ def map_recording(
     return MappingResult(finished_path(folder), mapped.grid, scores)
 
 
-def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options: Any) -> list[ReportFigure]:
+def draw_map(
+    mapped: Mapped,
+    recording: Recording,
+    folder: Path,
+    track: Track = untracked,
+    *,
+    truth_segments_m: FloatArray | None = None,
+) -> list[ReportFigure]:
     """Disparity, slice and cubes of a map as PNG files in folder; what the map has nothing to show of is left out."""
     observation, disparity = mapped.sample
     height_m = float(np.median(mapped.path_m[:, 2]))
@@ -134,8 +147,8 @@ def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options
         ),
         (
             "slice",
-            f"Slice of the map parallel to the ground at the camera's height, z = {height_m:.2f} m (Fig. 7).",
-            lambda: slice_figure(mapped.grid, height_m, path_m=mapped.path_m, **slice_options),
+            f"Slice of the map parallel to the ground at the camera's median height, z = {height_m:.2f} m (Fig. 7).",
+            lambda: slice_figure(mapped.grid, height_m, path_m=mapped.path_m, truth_segments_m=truth_segments_m),
         ),
         (
             "cubes",
@@ -145,7 +158,7 @@ def draw_map(mapped: Mapped, recording: Recording, folder: Path, **slice_options
         ),
     ]
     figures = []
-    for name, caption, draw in drawings:
+    for name, caption, draw in track(drawings, "drawing", len(drawings)):
         # A map without a cell at that height is a poor map, but no reason to lose it.
         with suppress(InvalidInputError):
             figures.append(ReportFigure(save_figure(draw(), folder / f"{name}.png"), caption))

@@ -57,11 +57,10 @@ def slice_figure(
 
 def _sample(grid: OccupancyGrid, height_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Cell centres x (X,), y (Y,) [m] of the known part of the slice and p (X, Y), NaN = unknown."""
-    cells, _ = grid.known_cells()
-    layer = cells[cells[:, 2] == np.floor(height_m / grid.cell_m)]
+    layer = grid.known_layer(height_m)
     if not len(layer):
         raise InvalidInputError(f"the map knows no cell at z = {height_m:.2f} m, so there is no slice to draw")
-    low, high = layer[:, :2].min(axis=0) - 1, layer[:, :2].max(axis=0) + 2
+    low, high = layer.min(axis=0) - 1, layer.max(axis=0) + 2
     stride = int(np.ceil((high - low).max() / LARGEST_CELLS))
     x, y = ((np.arange(a, b, stride) + 0.5) * grid.cell_m for a, b in zip(low, high, strict=True))
     points = np.stack([*np.meshgrid(x, y, indexing="ij"), np.full((len(x), len(y)), height_m)], axis=-1)

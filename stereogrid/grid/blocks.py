@@ -1,6 +1,7 @@
 """Sparse storage: a growing pool of cubic blocks, found by their index."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -84,14 +85,20 @@ class BlockStore:
         rows[inside] = np.where(keys[order][place] == wanted, order[place], -1)
         return rows
 
+    def in_order(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Block by block in lexical order of the index: index (3,), log-odds (16, 16, 16), and which are known."""
+        indices = self.indices()
+        for row in np.lexsort(indices.T[::-1]):
+            yield indices[row], self.log_odds[row], self.n_updates[row] > 0
+
     def known(self, above: float = -np.inf) -> tuple[Array, Array]:
         """Cells (N, 3) int64 that were updated and whose log-odds exceed `above`, and their log-odds (N,).
 
         Block by block in lexical order, and so within a block: the order does not depend on the map's history.
         """
-        indices = self.indices()
-        order = np.lexsort(indices.T[::-1])
-        log_odds, counts = self.log_odds[: len(self)][order], self.counts()[order]
-        row, i, j, k = np.nonzero((counts > 0) & (log_odds > above))
-        cells = indices[order][row] * BLOCK + np.stack([i, j, k], axis=1)
-        return cells, log_odds[row, i, j, k]
+        cells, values = [np.empty((0, 3), dtype=np.int64)], [np.empty(0, dtype=np.float32)]
+        for index, log_odds, known in self.in_order():
+            kept = known & (log_odds > above)
+            cells.append(index * BLOCK + np.argwhere(kept))
+            values.append(log_odds[kept])
+        return np.concatenate(cells), np.concatenate(values)

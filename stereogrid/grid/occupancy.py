@@ -12,9 +12,8 @@ from ..errors import InvalidInputError, MapTooLargeError, unknown_name
 from ..geometry import Array, FloatArray, as_floats, as_pose
 from ..observation import Disparity
 from ..sensor_model import SensorModel, kernel_parameters, log_odds, probability, widened_sigma_px
-from .blocks import BYTES_PER_CELL, BlockStore
-from .kernels import BLOCK, add_evidence, sweep_cells, vote_hits
-from .rays import sum_rays
+from .blocks import BlockStore
+from .kernels import BLOCK, add_evidence, sum_rays, sweep_cells, vote_hits
 from .view import blocks_in_view, view_volume_m3
 
 FUSIONS = ("cell", "sum_of_rays")
@@ -22,6 +21,10 @@ FUSIONS = ("cell", "sum_of_rays")
 
 NOWHERE = 2**52
 """An index beyond every cell."""
+FARTHEST_CELLS = 1e9
+"""A pose farther from the origin is a mistake, not a place."""
+WORKING_BYTES_PER_CELL = 24
+"""A cell in view while it is updated and drawn: what is kept of it, its evidence, and room for the pool to grow."""
 
 
 class OccupancyGrid:
@@ -47,6 +50,8 @@ class OccupancyGrid:
             raise unknown_name("fusion rule", fusion, FUSIONS)
         if clamp is not None and not clamp > 0:
             raise InvalidInputError(f"clamp must be a positive log-odds or None, not {clamp}")
+        if not memory_limit_gb > 0:
+            raise InvalidInputError(f"memory_limit_gb must be positive, not {memory_limit_gb}")
         self.cell_m, self.fusion, self.clamp = float(cell_m), fusion, clamp
         self.model = model or SensorModel()
         self.memory_limit_gb = memory_limit_gb
@@ -62,7 +67,7 @@ class OccupancyGrid:
         """Raise MapTooLargeError, naming the need, when one view of this camera would not fit in the limit."""
         # Cells can be so small that their volume vanishes in a float.
         cell_m3 = max(self.cell_m**3, sys.float_info.min)
-        need_gb = view_volume_m3(camera, self.model.max_range_m) / cell_m3 * BYTES_PER_CELL / 1e9
+        need_gb = view_volume_m3(camera, self.model.max_range_m) / cell_m3 * WORKING_BYTES_PER_CELL / 1e9
         if need_gb > self.memory_limit_gb:
             raise MapTooLargeError(
                 f"cells of {self.cell_m:g} m are too small: one view up to {self.model.max_range_m:g} m needs "
@@ -77,6 +82,8 @@ class OccupancyGrid:
         Raises InvalidInputError or MapTooLargeError and then leaves the map as it was.
         """
         pose = as_pose(T_world_cam, "T_world_cam")
+        if np.abs(pose[:3, 3]).max() > FARTHEST_CELLS * self.cell_m:
+            raise InvalidInputError(f"T_world_cam is {np.abs(pose[:3, 3]).max():.3g} m from the origin: too far to map")
         if disparity.disparity_px.shape != camera.shape:
             raise InvalidInputError(f"the disparity is {disparity.disparity_px.shape}, the camera {camera.shape}")
         if not (np.isfinite(motion_sigma_m) and motion_sigma_m >= 0):
@@ -148,6 +155,15 @@ class OccupancyGrid:
         cells, values = self.blocks.known()
         return cells, probability(values)
 
+    def known_layer(self, height_m: float) -> Array:
+        """Indices i, j (N, 2) int64 of the known cells at z = height_m [m] in world."""
+        k = int(np.floor(height_m / self.cell_m))
+        layers = [np.empty((0, 2), dtype=np.int64)]
+        for index, _, known in self.blocks.in_order():
+            if index[2] == k // BLOCK:
+                layers.append(index[:2] * BLOCK + np.argwhere(known[:, :, k % BLOCK]))
+        return np.concatenate(layers)
+
     def occupied_centres(self, threshold: float = 0.5) -> FloatArray:
         """Centres (N, 3) in world [m] of the known cells with p > threshold."""
         if not 0 <= threshold < 1:
@@ -157,11 +173,15 @@ class OccupancyGrid:
         return centres
 
     def sha256(self) -> str:
-        """Digest of the cell size and of all known cells with their log-odds, whatever the order they came in."""
-        cells, values = self.blocks.known()
+        """Digest of the cell size and of all known cells with their log-odds, whatever the order they came in.
+
+        How often a cell was updated is not part of it.
+        """
         digest = hashlib.sha256(np.float64(self.cell_m).tobytes())
-        digest.update(cells.astype("<i8").tobytes())
-        digest.update(values.astype("<f4").tobytes())
+        for index, values, known in self.blocks.in_order():
+            if known.any():
+                digest.update(index.astype("<i8").tobytes() + np.packbits(known).tobytes())
+                digest.update(values[known].astype("<f4").tobytes())
         return digest.hexdigest()
 
     def save(self, path: str | Path) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from stereogrid import cli
+from stereogrid import cli, mapping_run
 from stereogrid.camera import StereoCamera
 from stereogrid.config import MappingConfig, load_config
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
@@ -366,7 +366,7 @@ def test_in_a_process_of_its_own_bad_input_ends_with_exit_code_1(drive, tmp_path
 
 def test_a_run_that_fails_half_way_leaves_no_hidden_folder(drive, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli.mapping_run, "write_report", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(mapping_run, "write_report", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
     try:
         code = cli.run(cli.app, ["map", str(drive), "--cell", "0.05", "--out", "mine.sgrid"])
     except KeyboardInterrupt:

@@ -119,7 +119,7 @@ def test_sections_within_sections_are_named_by_their_whole_path(tmp_path):
 
 def test_defaults_suit_the_minoru():
     config = MappingConfig.for_camera(MINORU)
-    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.05, 4.1, 80)
+    assert (config.grid.cell_m, config.model.max_range_m, config.matcher.num_disparities) == (0.05, 4.08, 80)
 
 
 def test_defaults_suit_kitti():
@@ -132,8 +132,8 @@ def test_defaults_of_any_camera_are_within_their_rule(focal_px, baseline_m, widt
     camera = StereoCamera(focal_px, width_px / 2, 100, baseline_m, width_px, 200)
     config = MappingConfig.for_camera(camera)
     cell_m, range_m = config.grid.cell_m, config.model.max_range_m
-    # Eq. 8: 0.3 px are 10 cm of depth at the largest range, which is printed with one digit.
-    assert range_m == pytest.approx((0.1 * focal_px * baseline_m / 0.3) ** 0.5, abs=0.0501)
+    # Eq. 8: 0.3 px are 10 cm of depth at the largest range, which is given with three digits.
+    assert range_m == pytest.approx((0.1 * focal_px * baseline_m / 0.3) ** 0.5, rel=0.0051)
     assert range_m / 200 * (1 - 1e-9) <= cell_m <= range_m / 80 * (1 + 1e-9)
     assert f"{cell_m:e}"[0] in "125"
     assert float(f"{cell_m:.0e}") == cell_m

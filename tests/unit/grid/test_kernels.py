@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stereogrid.camera import StereoCamera
-from stereogrid.grid import kernels, rays
+from stereogrid.grid import kernels
 from stereogrid.grid.kernels import BLOCK
 from stereogrid.grid.view import blocks_in_view
 from stereogrid.sensor_model import FORMS, SensorModel, kernel_parameters
@@ -81,7 +81,7 @@ def test_the_vote_of_the_hits_agrees_with_its_twin_on_empty_and_on_swept_cells(s
 def test_the_sum_of_rays_agrees_with_its_twin(seed, model):
     blocks, *arguments = scene(seed, model)
     fast, slow = untouched(blocks), untouched(blocks)
-    rays.sum_rays(*lookup_of(blocks), *arguments, fast)
+    kernels.sum_rays(*lookup_of(blocks), *arguments, fast)
     twins.sum_rays(*lookup_of(blocks), *arguments, slow)
     assert not np.isnan(fast).all()
     # Sums of hundreds of float32 numbers of both signs, added in the same order.

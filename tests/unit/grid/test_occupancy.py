@@ -149,7 +149,7 @@ def test_the_printed_form_sinks_the_cells_behind_a_surface_where_the_prior_is_no
         for form in ("corrected", "printed")
     )
     assert np.isnan(corrected.probability(behind))
-    assert log_odds(printed.probability(behind)) == pytest.approx(3 * log_odds(0.2), abs=0.2)
+    assert log_odds(printed.probability(behind)) == pytest.approx(2 * log_odds(0.2), abs=0.2)
 
 
 # What the map answers

@@ -11,7 +11,7 @@ from stereogrid.geometry import from_yaw
 from stereogrid.observation import Disparity
 from stereogrid.sensor_model import SensorModel
 
-from .scenes import CAMERA, FORWARD, empty, mapped, no_disparity, wall
+from .scenes import CAMERA, FORWARD, empty, mapped, wall
 
 
 @pytest.mark.parametrize(
@@ -24,6 +24,8 @@ from .scenes import CAMERA, FORWARD, empty, mapped, no_disparity, wall
         ({"fusion": "mean"}, "'mean'; choose from: cell, sum_of_rays"),
         ({"clamp": 0}, "clamp"),
         ({"clamp": np.nan}, "clamp"),
+        ({"memory_limit_gb": np.nan}, "memory_limit_gb"),
+        ({"memory_limit_gb": -1}, "memory_limit_gb"),
     ],
 )
 def test_a_map_that_makes_no_sense_is_refused(options, culprit):
@@ -60,6 +62,7 @@ def bad_pose(i, j, value):
         (bad_pose(0, 3, np.nan), 0.0, (60, 80), "T_world_cam contains NaN"),
         (bad_pose(0, 0, 0.5), 0.0, (60, 80), "T_world_cam is not rigid"),
         (np.diag([1.0, 1, -1, 1]), 0.0, (60, 80), "T_world_cam is not rigid"),
+        (bad_pose(0, 3, 1e30), 0.0, (60, 80), "too far to map"),
         (np.eye(3), 0.0, (60, 80), r"T_world_cam must be a \(4, 4\)"),
         (FORWARD, -0.01, (60, 80), "motion_sigma_m"),
         (FORWARD, np.nan, (60, 80), "motion_sigma_m"),
@@ -75,10 +78,10 @@ def test_a_bad_observation_is_refused_and_the_map_stays_as_it_was(pose, eps_m, s
 
 
 @pytest.mark.parametrize(
-    ("cell_m", "need"), [(0.001, r"72 GB"), (1e-6, r"7.2e\+10 GB"), (1e-120, "GB, the limit is 4 GB")]
+    ("cell_m", "need"), [(0.001, r"288 GB"), (1e-6, r"2.88e\+11 GB"), (1e-120, "GB, the limit is 4 GB")]
 )
 def test_cells_too_small_for_the_memory_are_refused_at_once_naming_the_need(cell_m, need):
-    # The view is a pyramid of 80 * 60 / 60^2 * 3^3 / 3 = 12 m^3, at 6 bytes a cell.
+    # The view is a pyramid of 80 * 60 / 60^2 * 3^3 / 3 = 12 m^3, at 24 bytes a cell.
     grid = empty(cell_m=cell_m)
     tracemalloc.start()
     started_s = time.perf_counter()
@@ -95,12 +98,15 @@ def test_cells_too_small_for_the_memory_are_refused_at_once_naming_the_need(cell
 
 def test_growth_past_the_limit_is_refused_and_the_map_stays_as_it_was():
     grid = mapped([FORWARD], [wall(2.0)])
-    grid.memory_limit_gb = grid.n_bytes / 1e9
-    before = grid.sha256(), len(grid.blocks), len(grid.blocks.log_odds)
-    grid.integrate(CAMERA, no_disparity(), FORWARD)
-    away = from_yaw(2.0, [5, 3, 1]) @ FORWARD
+    # Room for one view and its scratch, but not for the views of a drive.
+    grid.memory_limit_gb = 2 * grid.n_bytes / 1e9
+    grid.check_fits(CAMERA)
+    elsewhere = [from_yaw(2.0 * n, [5.0 * n, 3, 1]) @ FORWARD for n in range(1, 9)]
     with pytest.raises(MapTooLargeError, match=r"would grow to .* GB, its limit is"):
-        grid.integrate(CAMERA, wall(2.0), away)
+        for T_world_cam in elsewhere:
+            before = grid.sha256(), len(grid.blocks), len(grid.blocks.log_odds)
+            grid.integrate(CAMERA, wall(2.0), T_world_cam)
+    assert len(grid.blocks) > 0
     assert (grid.sha256(), len(grid.blocks), len(grid.blocks.log_odds)) == before
     # What needs no more room is still taken.
     grid.integrate(CAMERA, wall(2.0), FORWARD)

@@ -6,6 +6,7 @@ but the size of a block.
 
 import numpy as np
 
+from stereogrid import as_printed
 from stereogrid.grid.kernels import BLOCK
 from stereogrid.sensor_model import SensorModel, log_odds, occupancy_probability
 
@@ -17,11 +18,8 @@ def gain(range_m, measured_m, sigma_m, cell_m, parameters):
         model = SensorModel(p_free=p_free, p_occupied=p_occupied, prior=prior)
         p = occupancy_probability(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
         return log_odds(p) - log_odds(prior)
-    side = np.where(range_m < measured_m, p_free, prior)
-    peak = 0.5 + cell_m / (sigma_m * np.sqrt(2 * np.pi))
-    p = side + (peak - side) * np.exp(-((range_m - measured_m) ** 2) / (2 * sigma_m**2))
-    p = np.minimum(p, 1 - 1e-6)
-    return np.log(p / (1 - prior)) - np.log((1 - p) / prior)
+    p = as_printed.occupancy_probability(range_m, measured_m, sigma_m, k_m=cell_m, p_min=p_free)
+    return as_printed.fuse(0.0, np.minimum(p, 1 - 1e-6), prior)
 
 
 def points_in_cam(points, pose):
