@@ -50,7 +50,10 @@ def write_report(
     them after the figures. meanings: of scores that SCORE_NAMES does not hold. facts: what was run (command,
     seed, ...); versions and the machine are added. config.toml is quoted where it stands in the folder.
     """
-    first = {arm: [score for score in scores if score.name in headline] for arm, scores in arms.items()}
+    first = {
+        arm: sorted((score for score in scores if score.name in headline), key=lambda score: headline.index(score.name))
+        for arm, scores in arms.items()
+    }
     config = folder / "config.toml"
     parts = [
         f"<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>",

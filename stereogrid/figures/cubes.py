@@ -52,7 +52,8 @@ def cubes_figure(
     axes.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors="face", linewidths=0.15))
     _draw_lines(axes, T_eye_world, np.stack([path_m[:-1], path_m[1:]], axis=1), 1.0)
     _draw_lines(axes, T_eye_world, frustum_lines_m(camera, T_world_cam), 1.6)
-    axes.set(xlim=(-0.75, 0.75), ylim=(-0.5, 0.4), aspect="equal", title=title)
+    (left, right), (low, high) = (_extent(polygons[..., n], limit) for n, limit in ((0, 0.75), (1, 0.5)))
+    axes.set(xlim=(left, right), ylim=(low, high), aspect="equal", title=title)
     axes.set_axis_off()
     return figure
 
@@ -85,6 +86,11 @@ def frustum_lines_m(camera: StereoCamera, T_world_cam: FloatArray, depth_m: floa
     apex = np.zeros((4, 3))
     edges = np.concatenate([np.stack([apex, corners], 1), np.stack([corners, np.roll(corners, -1, 0)], 1)])
     return transform(T_world_cam, edges)
+
+
+def _extent(values: FloatArray, limit: float) -> tuple[float, float]:
+    """Where the picture begins and ends: around all that is drawn, within +-limit of the view's axis."""
+    return max(float(values.min()) - 0.02, -limit), min(float(values.max()) + 0.02, limit)
 
 
 def _faces(cells: Array, cell_colours: FloatArray, cell_m: float, T_eye_world: FloatArray) -> tuple[Array, Array]:

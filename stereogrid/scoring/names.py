@@ -10,8 +10,8 @@ from .score import DIMENSIONLESS
 
 COVERAGE = {
     "coverage": (DIMENSIONLESS, "share of V that the map has touched"),
-    "coverage_occupied": (DIMENSIONLESS, "the same among OCCUPIED cells"),
-    "coverage_free": (DIMENSIONLESS, "the same among FREE cells"),
+    "coverage_occupied": (DIMENSIONLESS, "share of the OCCUPIED cells of V that the map has touched"),
+    "coverage_free": (DIMENSIONLESS, "share of the FREE cells of V that the map has touched"),
 }
 RANKING = {
     "auc": (DIMENSIONLESS, "chance that an OCCUPIED cell has a higher p than a FREE one, ties counted half"),
@@ -24,9 +24,9 @@ RANKING = {
 }
 CALIBRATION = {
     "brier": (DIMENSIONLESS, "mean squared error of p"),
-    "brier_balanced": (DIMENSIONLESS, "the same, mean of the two classes; .25 for p = .5"),
+    "brier_balanced": (DIMENSIONLESS, "mean squared error of p, mean of the two classes; .25 for p = .5"),
     "log_loss": ("nat", "mean negative log-likelihood, p clipped to [1e-6, 1 - 1e-6]"),
-    "log_loss_balanced": ("nat", "the same, mean of the two classes"),
+    "log_loss_balanced": ("nat", "mean negative log-likelihood, mean of the two classes"),
     "ece_width": (DIMENSIONLESS, "expected calibration error in 10 bins of equal width"),
     "ece_count": (DIMENSIONLESS, "expected calibration error in 10 bins of equal count, fewer where p ties"),
 }
