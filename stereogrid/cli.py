@@ -31,6 +31,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+INTERRUPTED = 130
+"""The exit code that typer gives to Ctrl-C."""
 console = Console()
 progress_console = Console(stderr=True)
 Item = TypeVar("Item")
@@ -184,6 +186,8 @@ def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         return 1
     except SystemExit as stop:  # how typer ends, well or not
+        if stop.code == INTERRUPTED:
+            print("interrupted; earlier results are as they were", file=sys.stderr)  # noqa: T201
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
 
