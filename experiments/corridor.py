@@ -116,7 +116,14 @@ def run(
         drive = reused or open_recording(record(config, folder / "drive.mcap", stage))
         truth, outcomes = score_arms(drive, config, stage)
         with stage("drawing", 5) as step:
-            facts = {"command": command, "recording": str(recording or "drive.mcap"), "pairs": str(len(drive))}
+            # A reused drive tells its own seed and spacing, which the config of this run may not.
+            driven = {f"drive {key}": value for key, value in getattr(drive, "metadata", {}).items()}
+            facts = {
+                "command": command,
+                "recording": str(recording or "drive.mcap"),
+                "pairs": str(len(drive)),
+                **driven,
+            }
             write_results(folder, drive, truth, outcomes, facts=facts, step=step)
     return finished_path(folder), outcomes
 

@@ -69,6 +69,7 @@ def test_the_run_folder_holds_everything_and_its_report_stands_alone(whole_run):
     assert (folder.parent / "latest").resolve() == folder.resolve()
     metrics = json.loads((folder / "metrics.json").read_text())
     assert set(metrics["arms"]) == set(outcomes)
+    assert metrics["facts"]["drive seed"] == "0" and metrics["facts"]["drive every_m"] == "0.25"
     assert metrics["arms"][IDEAL]["auc"]["value"] == pytest.approx(outcomes[IDEAL].value("auc"))
     assert load_config(CorridorConfig, folder / "config.toml") == CorridorConfig()
     grid = OccupancyGrid.load(folder / "map-ideal.sgrid")
