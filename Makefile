@@ -38,7 +38,7 @@ $(UV):
 
 .venv/ready: $(UV) pyproject.toml
 	$(UV) venv --quiet --clear --python $(PYTHON_VERSION) .venv
-	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,dev]"
+	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,oracle,dev]"
 	touch $@
 
 clean:

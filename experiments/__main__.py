@@ -12,6 +12,8 @@ from rich.table import Table
 from stereogrid.cli import run as run_command
 
 if TYPE_CHECKING:
+    from stereogrid.report import ReportTable
+
     from .corridor import Outcome
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
@@ -47,6 +49,58 @@ def corridor(
     )
 
 
+@app.command(epilog="Example: python -m experiments matchers --pairs shared/data/stereo")
+def matchers(
+    config: Annotated[Path | None, typer.Option(help="A config.toml, as a run leaves one.")] = None,
+    pairs: Annotated[
+        Path | None, typer.Option(help="A stereo pair with its truth, or a folder of some.  [$STEREOGRID_DATA/stereo]")
+    ] = None,
+    recording: Annotated[Path | None, typer.Option(help="Map this recorded drive again.")] = None,
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Compare the matchers on pairs of known disparity, and by the map that each makes of one drive."""
+    from stereogrid.config import load_config
+
+    from .matchers import MatchersConfig
+    from .matchers import run as run_matchers
+    from .parallel import rich_stage
+
+    start_s = time.perf_counter()
+    chosen = load_config(MatchersConfig, config) if config else MatchersConfig()
+    command = " ".join(["python -m experiments", *sys.argv[1:]])
+    folder, tables = run_matchers(chosen, rich_stage, runs=runs, pairs=pairs, recording=recording, command=command)
+    console = Console()
+    for table in tables:
+        console.print(_rich(table))
+    console.print(
+        f"{folder / 'report.html'} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True
+    )
+
+
+@app.command(epilog="Example: python -m experiments sigma --data ../shared/data --write")
+def sigma(
+    data: Annotated[Path, typer.Option(envvar="STEREOGRID_DATA", help="shared/data, whose stereo/ holds the pairs.")],
+    matcher: Annotated[list[str] | None, typer.Option(help="Only this one; may be given again.  [all]")] = None,
+    write: Annotated[bool, typer.Option("--write", help="Put the tables into the library.")] = False,
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Fit each matcher's disparity sigma, and test it on scenes that it was fitted without."""
+    from .parallel import rich_stage
+    from .sigma import run as run_sigma
+
+    start_s = time.perf_counter()
+    command = " ".join(["python -m experiments", *sys.argv[1:]])
+    folder, rows = run_sigma(data, rich_stage, runs=runs, names=matcher or (), write=write, command=command)
+    table = Table("matcher", "fitted on", "tested on", "1s", "2s", "", "1s raw", "2s raw", "1s all", "2s all", box=None)
+    for row in rows:
+        shares = (row.one_raw, row.two_raw, row.one_all, row.two_all)
+        found = (f"{row.one:.1f}", f"{row.two:.1f}", "" if row.within else "*", *(f"{share:.1f}" for share in shares))
+        table.add_row(row.matcher, row.fitted_on, row.scenes, *found)
+    console = Console()
+    console.print(table)
+    console.print(f"{folder} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True)
+
+
 @app.command(epilog="Example: python -m experiments pictures runs/latest")
 def pictures(
     run: Annotated[Path, typer.Argument(help="A run of the corridor experiment, with its drive.mcap.")],
@@ -65,6 +119,13 @@ def _table(outcomes: "dict[str, Outcome]", headline: tuple[str, ...]) -> Table:
         values = (f"{outcome.value(name):.3f}" for outcome in outcomes.values())
         table.add_row(name, "" if units[name] == "1" else units[name], *values)
     return table
+
+
+def _rich(table: "ReportTable") -> Table:
+    shown = Table(*table.header, box=None)
+    for row in table.rows:
+        shown.add_row(*row)
+    return shown
 
 
 if __name__ == "__main__":

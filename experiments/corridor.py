@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from sim.noise import NoisyImages, image_noise
-from sim.record import record_drive
 from sim.rig import MINORU
 from stereogrid.camera import StereoCamera
 from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, save_config
@@ -29,27 +28,10 @@ from stereogrid.scoring import Score, scores_to_dict
 from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import SensorModel
 
+from .drives import HEADLINE, OBSTACLE_MEANINGS, OBSTACLES_M, DriveConfig, about, record, score
 from .parallel import Stage, Step, counted, in_parallel
 
 IDEAL, NOISY, TRUE_DEPTH, SHUFFLED = "ideal", "noisy", "true depth", "shuffled poses"
-HEADLINE = (
-    "auc",
-    "occupied_precision",
-    "occupied_recall",
-    "occupied_f1",
-    "obstacle_auc",
-    "obstacle_occupied_f1",
-    "coverage_occupied",
-    "brier_balanced",
-    "log_loss",
-    "ece_width",
-    "accuracy_m",
-    "completeness_m",
-)
-"""What the table on the screen shows of the scores in metrics.json."""
-OBSTACLES_M = (0.15, 2.4)
-"""Heights between the floor and the ceiling of the corridor [m]."""
-OBSTACLE_SCORES = ("auc", "occupied_precision", "occupied_recall", "occupied_f1")
 TRUE_SIGMA_PX = 0.05
 """Of the true disparity: small against any matcher's, large enough that the sensor model stays smooth."""
 
@@ -93,6 +75,11 @@ class CorridorConfig:
             if not getattr(self, name) >= 0:
                 raise InvalidInputError(f"{name} must be >= 0, not {getattr(self, name)}")
 
+    @property
+    def drive(self) -> DriveConfig:
+        """The drive to be simulated."""
+        return DriveConfig("corridor", self.seed, self.every_m, self.distance_m)
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -113,32 +100,12 @@ def run(
     reused = open_recording(recording) if recording else None
     with run_folder(runs, "corridor") as folder:
         save_config(config, folder / "config.toml")
-        drive = reused or open_recording(record(config, folder / "drive.mcap", stage))
+        drive = reused or open_recording(record(config.drive, folder / "drive.mcap", stage))
         truth, outcomes = score_arms(drive, config, stage)
         with stage("drawing", 5) as step:
-            # A reused drive tells its own seed and spacing, which the config of this run may not.
-            driven = {f"drive {key}": value for key, value in getattr(drive, "metadata", {}).items()}
-            facts = {
-                "command": command,
-                "recording": str(recording or "drive.mcap"),
-                "pairs": str(len(drive)),
-                **driven,
-            }
+            facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
             write_results(folder, drive, truth, outcomes, facts=facts, step=step)
     return finished_path(folder), outcomes
-
-
-def record(config: CorridorConfig, path: Path, stage: Stage) -> Path:
-    """Simulate the drive into an MCAP file."""
-    with stage("driving", 1) as step:
-        return record_drive(
-            path,
-            world="corridor",
-            seed=config.seed,
-            every_m=config.every_m,
-            max_distance_m=config.distance_m or None,
-            progress=step.to,
-        )
 
 
 def arms(drive: Recording, config: CorridorConfig, track: Track) -> dict[str, Callable[[], Mapped]]:
@@ -188,13 +155,6 @@ def score_arms(drive: Recording, config: CorridorConfig, stage: Stage) -> tuple[
     return truth, {name: Outcome(mapped, scores[name]) for name, mapped in results.items()}
 
 
-def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
-    """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
-    among = obstacles.score(mapped.grid, prior=mapped.grid.model.prior, surface=False)
-    named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
-    return [*truth.score(mapped.grid, prior=mapped.grid.model.prior), *named]
-
-
 def write_results(
     folder: Path,
     drive: Recording,
@@ -207,7 +167,6 @@ def write_results(
     """Maps, metrics, figures and the report of the run, into its folder."""
     for name, outcome in outcomes.items():
         outcome.mapped.grid.save(folder / f"map-{name.replace(' ', '-')}.sgrid")
-    low, high = OBSTACLES_M
     write_metrics(folder, {"facts": facts, "arms": {n: scores_to_dict(o.scores) for n, o in outcomes.items()}})
     write_report(
         folder,
@@ -218,7 +177,7 @@ def write_results(
         figures=draw(folder, drive, truth, outcomes, step=step),
         facts=facts,
         headline=HEADLINE,
-        meanings={f"obstacle_{name}": f"{name} of the cells from {low} to {high} m" for name in OBSTACLE_SCORES},
+        meanings=OBSTACLE_MEANINGS,
     )
 
 

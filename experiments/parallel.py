@@ -1,8 +1,9 @@
 """Jobs on both cores, and the progress bars that show them."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
 from contextlib import AbstractContextManager, contextmanager
+from threading import Event
 from typing import Any, Protocol, TypeVar
 
 from rich.console import Console
@@ -12,6 +13,7 @@ from stereogrid.mapping_run import Track
 
 WORKERS = 2
 Item = TypeVar("Item")
+Key = TypeVar("Key")
 
 
 class Step(Protocol):
@@ -39,10 +41,25 @@ def counted(step: Step) -> Track:
     return track
 
 
-def in_parallel(jobs: Mapping[str, Callable[[], Any]], done: Callable[[], None] = lambda: None) -> dict[str, Any]:
+def until(stop: Event, track: Track) -> Track:
+    """track, cut short once stop is set: the job that reads the items ends with CancelledError."""
+
+    def stopping(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:
+        for item in track(items, what, total):
+            if stop.is_set():
+                raise CancelledError
+            yield item
+
+    return stopping
+
+
+def in_parallel(
+    jobs: Mapping[Key, Callable[[], Any]], done: Callable[[], None] = lambda: None, stop: Event | None = None
+) -> dict[Key, Any]:
     """The jobs' results by name. Threads serve: OpenCV, Numba and embree let go of the interpreter.
 
-    done is called after each job. The first exception stops what has not begun and is raised.
+    done is called after each job. The first exception, an interrupt too, stops what has not begun, sets stop for
+    what runs, and is raised.
     """
     with ThreadPoolExecutor(WORKERS) as pool:
         futures = {pool.submit(job): name for name, job in jobs.items()}
@@ -52,6 +69,8 @@ def in_parallel(jobs: Mapping[str, Callable[[], Any]], done: Callable[[], None] 
                 results[futures[future]] = future.result()
                 done()
         except BaseException:
+            if stop is not None:
+                stop.set()
             pool.shutdown(cancel_futures=True)
             raise
     return {name: results[name] for name in jobs}

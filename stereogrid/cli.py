@@ -17,7 +17,7 @@ from rich.table import Table
 from .errors import InvalidInputError, StereogridError
 
 if TYPE_CHECKING:
-    from .config import MappingConfig
+    from .config import MappingConfig, MatcherConfig
     from .scoring import Score
 
 # What takes seconds to import (Numba, OpenCV, matplotlib) is imported by the commands that need it: --help and errors
@@ -45,7 +45,8 @@ def map_command(
     recording: RecordingPath,
     out: Annotated[Path | None, typer.Option(help="Also save the map here (.sgrid).")] = None,
     config: Annotated[Path | None, typer.Option(help="A config.toml; the options below override it.")] = None,
-    matcher: Annotated[str | None, typer.Option(help="bm or sgbm.")] = None,
+    matcher: Annotated[str | None, typer.Option(help="bm, sgbm or onnx.")] = None,
+    network: Annotated[Path | None, typer.Option(help="The TOML file that describes onnx's network.")] = None,
     num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
     cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
     max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
@@ -63,7 +64,8 @@ def map_command(
     if pose_source not in ("odometry", "truth"):
         raise InvalidInputError(f"--poses must be odometry or truth, not {pose_source!r}")
     chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
-    chosen = _overridden(chosen, matcher, num_disparities, cell, max_range)
+    chosen = replace(chosen, matcher=_chosen_matcher(chosen.matcher, matcher, network, num_disparities))
+    chosen = _overridden(chosen, cell, max_range)
     result = map_recording(
         TruePoses(source) if pose_source == "truth" else source,
         chosen,
@@ -77,18 +79,19 @@ def map_command(
     console.print(f"{result.grid!r}\n{result.folder}", highlight=False, soft_wrap=True)
 
 
-def _overridden(
-    config: "MappingConfig",
-    matcher: str | None,
-    num_disparities: int | None,
-    cell: float | None,
-    max_range: float | None,
-) -> "MappingConfig":
+def _chosen_matcher(
+    config: "MatcherConfig", name: str | None, network: Path | None, num_disparities: int | None
+) -> "MatcherConfig":
+    """config with the options that were given on the command line; another matcher does not keep its network."""
+    name = name or ("onnx" if network else config.name)
+    # Whole, because the run's own config.toml will name it from elsewhere.
+    kept = str(network.resolve()) if network else config.network if name == config.name else ""
+    count = config.num_disparities if num_disparities is None else num_disparities
+    return replace(config, name=name, network=kept, num_disparities=count)
+
+
+def _overridden(config: "MappingConfig", cell: float | None, max_range: float | None) -> "MappingConfig":
     """config with the options that were given on the command line."""
-    if matcher is not None:
-        config = replace(config, matcher=replace(config.matcher, name=matcher))
-    if num_disparities is not None:
-        config = replace(config, matcher=replace(config.matcher, num_disparities=num_disparities))
     if cell is not None:
         config = replace(config, grid=replace(config.grid, cell_m=cell))
     if max_range is not None:

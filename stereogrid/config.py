@@ -1,28 +1,17 @@
-"""Every parameter of a run in one TOML file: read, checked, and written back beside the results."""
+"""Every parameter of a run in one TOML file, written back beside the results."""
 
-import difflib
 import math
-import sys
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from dataclasses import dataclass, field
 
 from .camera import StereoCamera
-from .errors import ConfigError, StereogridError
-from .files import written_beside
+from .errors import InvalidInputError
 from .grid import OccupancyGrid
 from .mapper import Mapper
 from .matching import matcher
 from .motion import MotionError
+from .observation import Matcher
 from .sensor_model import SensorModel
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-T = TypeVar("T")
+from .tomlfile import config_from_table, load_config, save_config
 
 TYPICAL_SIGMA_PX = 0.3
 USEFUL_SIGMA_M = 0.1
@@ -31,10 +20,20 @@ CELLS_A_RANGE = 80
 
 @dataclass(frozen=True)
 class MatcherConfig:
-    """[matcher]: name of the matcher, disparities searched [px]."""
+    """[matcher]: name of the matcher, disparities searched [px]; network: the TOML file that describes onnx's."""
 
     name: str = "bm"
     num_disparities: int = 64
+    network: str = ""
+
+    def __post_init__(self) -> None:
+        if self.network and self.name != "onnx":
+            raise InvalidInputError(f"network is for the matcher 'onnx'; {self.name!r} takes none")
+
+    def build(self) -> Matcher:
+        """The matcher. Raises InvalidInputError for one that there is not."""
+        network = {"network": self.network} if self.network else {}
+        return matcher(self.name, num_disparities=self.num_disparities, **network)
 
 
 @dataclass(frozen=True)
@@ -81,53 +80,7 @@ class MappingConfig:
             clamp=self.grid.clamp or None,
             memory_limit_gb=self.grid.memory_limit_gb,
         )
-        chosen = matcher(self.matcher.name, num_disparities=self.matcher.num_disparities)
-        return Mapper(camera, chosen, grid, self.motion_error)
+        return Mapper(camera, self.matcher.build(), grid, self.motion_error)
 
 
-def config_from_table(kind: type[T], table: Mapping[str, Any], where: str = "") -> T:
-    """A config dataclass from a nested table; unknown keys and values of the wrong type are refused by name."""
-    types = get_type_hints(kind)
-    names = [f.name for f in fields(kind)]  # type: ignore[arg-type]
-    values: dict[str, Any] = {}
-    for key, value in table.items():
-        if key not in names:
-            near = difflib.get_close_matches(key, names, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ";"
-            raise ConfigError(f"unknown key {where + key!r}{hint} choose from: {', '.join(names)}")
-        values[key] = _checked(types[key], value, where + key)
-    try:
-        return kind(**values)
-    except StereogridError as error:
-        raise ConfigError(f"[{where.rstrip('.') or 'config'}] {error}") from None
-
-
-def _checked(expected: Any, value: Any, where: str) -> Any:
-    if is_dataclass(expected):
-        if not isinstance(value, Mapping):
-            raise ConfigError(f"{where!r} must be a section, not {value!r}")
-        return config_from_table(expected, value, f"{where}.")  # type: ignore[arg-type]
-    if expected is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if type(value) is not expected:
-        raise ConfigError(f"{where!r} must be {expected.__name__}, not {value!r}")
-    return value
-
-
-def load_config(kind: type[T], path: str | Path) -> T:
-    """A config dataclass from a TOML file. Raises ConfigError naming the file and the culprit."""
-    path = Path(path)
-    try:
-        return config_from_table(kind, tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ConfigError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: {error}") from None
-
-
-def save_config(config: Any, path: str | Path) -> None:
-    """Write a config dataclass as TOML that load_config reads back to an equal one."""
-    import tomli_w
-
-    with written_beside(Path(path)) as temporary:
-        temporary.write_text(tomli_w.dumps(asdict(config)), encoding="utf-8")
+__all__ = ["GridConfig", "MappingConfig", "MatcherConfig", "config_from_table", "load_config", "save_config"]

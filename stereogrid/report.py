@@ -3,12 +3,14 @@
 import base64
 import html
 import json
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from .errors import InvalidInputError
 from .files import written_beside
 from .scoring import SCORE_NAMES, Score
 from .scoring.score import DIMENSIONLESS
@@ -33,6 +35,45 @@ class ReportFigure:
     caption: str
 
 
+@dataclass(frozen=True)
+class ReportTable:
+    """Rows of text under a header; the first n_names columns name the row, the others hold numbers.
+
+    caption: what is shown, in few words; note: how to read it.
+    """
+
+    caption: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    n_names: int = 1
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.header):
+                raise InvalidInputError(f"a row of {len(row)} cells under a header of {len(self.header)}: {row[0]}")
+
+    @property
+    def html(self) -> str:
+        """The table as HTML."""
+        head = "".join(f"<th>{html.escape(cell)}</th>" for cell in self.header)
+        kinds = ["<td>" if n < self.n_names else '<td class="number">' for n in range(len(self.header))]
+        rows = (
+            "".join(f"{kind}{html.escape(cell)}</td>" for kind, cell in zip(kinds, row, strict=True))
+            for row in self.rows
+        )
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        note = f"<p>{html.escape(self.note)}</p>" if self.note else ""
+        return f"<table><caption>{html.escape(self.caption)}</caption><tr>{head}</tr>{body}</table>{note}"
+
+    @property
+    def markdown(self) -> str:
+        """The table as Markdown, under its caption and note."""
+        lines = [self.header, ["---"] * len(self.header), *self.rows]
+        table = "".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |\n" for line in lines)
+        return f"{self.caption}. {self.note}".strip() + f"\n\n{table}"
+
+
 def write_report(
     folder: Path,
     title: str,
@@ -43,12 +84,14 @@ def write_report(
     facts: Mapping[str, str],
     headline: Sequence[str] = (),
     meanings: Mapping[str, str] | None = None,
+    tables: Sequence[ReportTable] = (),
 ) -> Path:
     """Write folder/report.html with the figures inside it.
 
-    arms: scores of each arm of the experiment, by the arm's name; those named in headline come first, all of
-    them after the figures. meanings: of scores that SCORE_NAMES does not hold. facts: what was run (command,
-    seed, ...); versions and the machine are added. config.toml is quoted where it stands in the folder.
+    arms: scores of each arm of the experiment, by the arm's name; those named in headline come first, or the tables
+    instead, where there are any; all scores come after the figures. meanings: of scores that SCORE_NAMES does not
+    hold. facts: what was run (command, seed, ...); versions and the machine are added. config.toml is quoted where it
+    stands in the folder.
     """
     first = {
         arm: sorted((score for score in scores if score.name in headline), key=lambda score: headline.index(score.name))
@@ -57,9 +100,10 @@ def write_report(
     config = folder / "config.toml"
     parts = [
         f"<h1>{html.escape(title)}</h1><p>{html.escape(summary)}</p>",
-        score_table(first if headline else arms, meanings),
+        *(table.html for table in tables),
+        "" if tables else score_table(first if headline else arms, meanings),
         *(_figure(figure) for figure in figures),
-        _folded("All scores", score_table(arms, meanings)) if headline else "",
+        _folded("All scores", score_table(arms, meanings)) if headline or tables else "",
         _facts({**facts, **environment()}),
     ]
     if config.exists():
@@ -105,7 +149,7 @@ def environment() -> dict[str, str]:
     return {
         "versions": ", ".join(f"{name} {version}" for name, version in versions.items() if version),
         "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
     }
 
 

@@ -1,16 +1,22 @@
 """Figures of maps and readings. Each function returns a matplotlib Figure; nothing opens a window."""
 
 from .cubes import cubes_figure
+from .panels import panels_figure
 from .pictures import disparity_figure
 from .reliability import reliability_figure
 from .save import figure_png, save_figure
-from .slices import slice_figure
+from .slices import slice_figure, slices_figure
+from .tradeoff import TradeoffPoint, tradeoff_figure
 
 __all__ = [
+    "TradeoffPoint",
     "cubes_figure",
     "disparity_figure",
     "figure_png",
+    "panels_figure",
     "reliability_figure",
     "save_figure",
     "slice_figure",
+    "slices_figure",
+    "tradeoff_figure",
 ]

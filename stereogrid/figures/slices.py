@@ -1,9 +1,12 @@
 """The 2D slice of the map parallel to the ground (the paper's Fig. 7)."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 
 from ..errors import InvalidInputError
@@ -30,13 +33,68 @@ def slice_figure(
     path_m (N, 3): where the camera went, drawn in red. truth_segments_m (S, 2, 3): the true surfaces' section
     with the plane, in green.
     """
-    x, y, p = _sample(grid, height_m)
-    span = (x[-1] - x[0]) / max(y[-1] - y[0], 1e-9)
-    figure = Figure(figsize=(9, float(np.clip(7.2 / span, 2.0, 9)) + 1.2), layout="constrained")
+    width_m, depth_m = _span_m(grid, height_m)
+    figure = Figure(figsize=(9, float(np.clip(7.2 * depth_m / width_m, 2.0, 9)) + 1.2), layout="constrained")
     axes = figure.add_subplot()
+    image = _draw(axes, grid, height_m)
+    figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
+    _overlays(axes, path_m, truth_segments_m)
+    _legend(figure, axes)
+    axes.set(xlabel="x (world) [m]", ylabel="y (world) [m]", title=title or f"Slice at z = {height_m:.2f} m")
+    return figure
+
+
+def slices_figure(
+    grids: Mapping[str, OccupancyGrid],
+    height_m: float,
+    *,
+    path_m: FloatArray | None = None,
+    truth_segments_m: FloatArray | None = None,
+) -> Figure:
+    """The slices of several maps of one place, by name, as slice_figure draws them and all to one scale.
+
+    Long maps stand one above the other, tall ones side by side.
+    """
+    figure, all_axes = _side_by_side(np.max([_span_m(grid, height_m) for grid in grids.values()], axis=0), len(grids))
+    limits = []
+    for axes, (name, grid) in zip(all_axes, grids.items(), strict=True):
+        image = _draw(axes, grid, height_m)
+        limits.append(image.get_extent())
+        _overlays(axes, path_m, truth_segments_m)
+        axes.set(title=name, xlabel="x (world) [m]", ylabel="y (world) [m]")
+        axes.label_outer()
+    if path_m is not None:
+        x, y = path_m[:, 0], path_m[:, 1]
+        limits.append((x.min() - 0.1, x.max() + 0.1, y.min() - 0.1, y.max() + 0.1))
+    low, high = np.min(limits, axis=0), np.max(limits, axis=0)
+    all_axes[0].set(xlim=(low[0], high[1]), ylim=(low[2], high[3]))
+    figure.colorbar(image, ax=all_axes, label="p(occupied)", shrink=0.6, aspect=30)
+    _legend(figure, all_axes[0])
+    return figure
+
+
+def _side_by_side(span_m: FloatArray, n: int) -> tuple[Figure, list[Axes]]:
+    """A figure with room for n slices of that width and depth."""
+    width_m, depth_m = span_m
+    long = width_m > depth_m
+    shape = (n, 1) if long else (1, n)
+    each_inches = [9.0, 7.6 * depth_m / width_m + 0.4] if long else [6.0 * width_m / depth_m + 0.5, 6.0]
+    size = (each_inches[0] * shape[1] + 0.6, each_inches[1] * shape[0] + 1.0)
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel())
+
+
+def _span_m(grid: OccupancyGrid, height_m: float) -> tuple[float, float]:
+    """Width and depth of the known part of the slice [m]."""
+    x, y, _ = _sample(grid, height_m)
+    return max(x[-1] - x[0], 1e-9), max(y[-1] - y[0], 1e-9)
+
+
+def _draw(axes: Axes, grid: OccupancyGrid, height_m: float) -> AxesImage:
+    x, y, p = _sample(grid, height_m)
     half = (x[1] - x[0]) / 2
     axes.set_facecolor(UNKNOWN_COLOUR)
-    image = axes.imshow(
+    return axes.imshow(
         p.T,
         origin="lower",
         extent=(x[0] - half, x[-1] + half, y[0] - half, y[-1] + half),
@@ -45,14 +103,13 @@ def slice_figure(
         vmax=1,
         interpolation="nearest",
     )
-    figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
-    _overlays(axes, path_m, truth_segments_m)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
     # Below the axes: inside them it would hide a part of the map.
     unknown = Patch(facecolor=UNKNOWN_COLOUR, edgecolor="0.6", label="unknown")
     handles = [*axes.get_legend_handles_labels()[0], unknown]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
-    axes.set(xlabel="x (world) [m]", ylabel="y (world) [m]", title=title or f"Slice at z = {height_m:.2f} m")
-    return figure
 
 
 def _sample(grid: OccupancyGrid, height_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:

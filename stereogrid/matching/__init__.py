@@ -7,9 +7,18 @@ from typing import Any
 from ..errors import InvalidInputError, unknown_name
 from ..observation import Matcher
 from .block import BlockMatcher
+from .graphcut import GraphCutMatcher
+from .kz2 import KolmogorovZabihMatcher
+from .onnx import OnnxMatcher
 from .semiglobal import SemiGlobalMatcher
 
-MATCHERS: dict[str, Callable[..., Matcher]] = {"bm": BlockMatcher, "sgbm": SemiGlobalMatcher}
+MATCHERS: dict[str, Callable[..., Matcher]] = {
+    "bm": BlockMatcher,
+    "gc": GraphCutMatcher,
+    "kz2": KolmogorovZabihMatcher,
+    "onnx": OnnxMatcher,
+    "sgbm": SemiGlobalMatcher,
+}
 
 
 def matcher(name: str, **options: Any) -> Matcher:
@@ -23,4 +32,12 @@ def matcher(name: str, **options: Any) -> Matcher:
     return MATCHERS[name](**options)
 
 
-__all__ = ["MATCHERS", "BlockMatcher", "SemiGlobalMatcher", "matcher"]
+__all__ = [
+    "MATCHERS",
+    "BlockMatcher",
+    "GraphCutMatcher",
+    "KolmogorovZabihMatcher",
+    "OnnxMatcher",
+    "SemiGlobalMatcher",
+    "matcher",
+]

@@ -32,4 +32,5 @@ class BlockMatcher:
 
     def match(self, left: Image, right: Image) -> Disparity:
         """Disparity of each pixel of the left image (H, W) uint8; NaN where no match is trusted."""
-        return match_padded(self._algorithm, left, right, num_disparities=self.num_disparities, block_px=self.block_px)
+        count, block_px = self.num_disparities, self.block_px
+        return match_padded(self._algorithm, left, right, num_disparities=count, block_px=block_px, name="bm")

@@ -32,8 +32,13 @@ def check_size(image: Image, num_disparities: int, block_px: int) -> None:
         )
 
 
-def match_padded(algorithm: Any, left: Image, right: Image, *, num_disparities: int, block_px: int) -> Disparity:
-    """Run a cv2 matcher so that no columns are lost; NaN where nothing matched or the match is out of the image."""
+def match_padded(
+    algorithm: Any, left: Image, right: Image, *, num_disparities: int, block_px: int, name: str
+) -> Disparity:
+    """Run a cv2 matcher so that no columns are lost; NaN where nothing matched or the match is out of the image.
+
+    name: the matcher's in MATCHERS, whose sigma table serves.
+    """
     check_pair(left, right)
     check_size(left, num_disparities, block_px)
     # OpenCV gives no disparity for the first num_disparities columns: give it as many that do not count.
@@ -42,6 +47,4 @@ def match_padded(algorithm: Any, left: Image, right: Image, *, num_disparities: 
     disparity_px = raw.astype(np.float32) / np.float32(FIXED_POINT)
     column = np.arange(left.shape[1], dtype=np.float32)
     disparity_px[(disparity_px <= 0) | (disparity_px > column)] = np.nan
-    sigma_px = disparity_sigma_px(left, block_px)
-    sigma_px[np.isnan(disparity_px)] = np.nan
-    return Disparity(disparity_px, sigma_px)
+    return Disparity(disparity_px, disparity_sigma_px(left, right, disparity_px, matcher=name))

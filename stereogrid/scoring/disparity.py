@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInputError
 from ..geometry import FloatArray
-from ..observation import FloatImage
+from ..observation import Disparity, FloatImage
 from .score import DIMENSIONLESS, Score
 
 PERCENT, PIXEL = "%", "px"
@@ -57,13 +57,30 @@ def disparity_scores(found_px: FloatImage, truth_px: FloatArray, judged: NDArray
 
 def _errors(error_px: FloatArray, suffix: str) -> list[Score]:
     n = error_px.size
-    bad = [
-        Score(f"bad_{px:.1f}{suffix}".replace(".", "_"), 100 * float(np.mean(error_px > px)), PERCENT, n)
-        if n
-        else Score(f"bad_{px:.1f}{suffix}".replace(".", "_"), np.nan, PERCENT, 0)
-        for px in BAD_PX
+    bad = {f"bad_{px:.1f}".replace(".", "_"): 100 * float(np.mean(error_px > px)) if n else np.nan for px in BAD_PX}
+    mae_px = float(np.mean(error_px)) if n else np.nan
+    return [
+        *(Score(f"{name}{suffix}", value, PERCENT, n) for name, value in bad.items()),
+        Score(f"mae{suffix}", mae_px, PIXEL, n),
     ]
-    return [*bad, Score(f"mae{suffix}", float(np.mean(error_px)) if n else np.nan, PIXEL, n)]
+
+
+def sigma_coverage(
+    found: Disparity, truth_px: FloatArray, judged: NDArray[np.bool_], *, step_px: float = 0.0
+) -> list[Score]:
+    """Shares of the matched, judged pixels whose error is within 1 and 2 sigma: .683 and .954 where sigma is right.
+
+    A truth that is a multiple of step_px is itself off by up to half of it: its variance step^2 / 12 is added to
+    sigma^2, so that the rounding is not held against the matcher.
+    """
+    valid = judged & found.valid
+    n = int(valid.sum())
+    error_px = np.abs(found.disparity_px[valid] - truth_px[valid])
+    sigma_px = np.sqrt(np.square(found.sigma_px[valid], dtype=np.float64) + step_px**2 / 12)
+    return [
+        Score(f"within_{times}_sigma", float(np.mean(error_px <= times * sigma_px)) if n else np.nan, DIMENSIONLESS, n)
+        for times in (1, 2)
+    ]
 
 
 def occlusion_f1(found_px: FloatImage, occluded: NDArray[np.bool_], judged: NDArray[np.bool_]) -> Score:

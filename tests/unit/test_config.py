@@ -165,3 +165,37 @@ def test_a_mapper_of_an_unknown_matcher_is_refused_with_the_choices():
 def test_saving_into_a_folder_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InvalidInputError, match=r"no such folder, so config\.toml cannot be written"):
         save_config(MappingConfig(), tmp_path / "none" / "config.toml")
+
+
+def test_a_network_is_for_onnx_alone(tmp_path):
+    with pytest.raises(ConfigError, match=r"\[matcher\] network is for the matcher 'onnx'; 'bm' takes none"):
+        from_text(tmp_path, '[matcher]\nnetwork = "net.toml"\n')
+    config = from_text(tmp_path, '[matcher]\nname = "onnx"\nnetwork = "none.toml"\n')
+    with pytest.raises(ConfigError, match=r"none\.toml: cannot be read"):
+        config.build_mapper(MINORU)
+    with pytest.raises(InvalidInputError, match="the matcher 'onnx' needs a network"):
+        MappingConfig(matcher=MatcherConfig("onnx")).build_mapper(MINORU)
+
+
+@dataclass(frozen=True)
+class Lists:
+    shape: tuple[int, ...]
+    grids: tuple[GridConfig, ...] = ()
+
+
+def test_lists_are_read_item_by_item_and_a_wrong_item_is_named_by_its_place(tmp_path):
+    found = config_from_table(Lists, {"shape": [3, 4], "grids": [{"cell_m": 1}, {}]})
+    assert found == Lists((3, 4), (GridConfig(cell_m=1.0), GridConfig()))
+    save_config(found, tmp_path / "lists.toml")
+    assert load_config(Lists, tmp_path / "lists.toml") == found
+    with pytest.raises(ConfigError, match=r"'shape\[1\]' must be int, not 'x'"):
+        config_from_table(Lists, {"shape": [3, "x"]})
+    with pytest.raises(ConfigError, match=r"unknown key 'grids\[0\]\.cell'"):
+        config_from_table(Lists, {"shape": [], "grids": [{"cell": 1}]})
+    with pytest.raises(ConfigError, match="'shape' must be a list, not 3"):
+        config_from_table(Lists, {"shape": 3})
+
+
+def test_a_key_without_a_default_is_asked_for_by_name():
+    with pytest.raises(ConfigError, match="missing key 'shape'"):
+        config_from_table(Lists, {})

@@ -37,7 +37,7 @@ class Canned:
 def match_canned(raw):
     image = np.tile(np.arange(raw.shape[1], dtype=np.uint8), (len(raw), 1))
     canned = Canned(raw.astype(np.int16))
-    return match_padded(canned, image, image, num_disparities=16, block_px=3), canned
+    return match_padded(canned, image, image, num_disparities=16, block_px=3, name="bm"), canned
 
 
 def test_raw_disparities_are_sixteenths_of_a_pixel():

@@ -1,4 +1,8 @@
-"""The disparity's standard deviation is that of a least-squares shift between two noisy windows, and no smaller."""
+"""Sigma: a product of one factor a cue, from the matcher's table, within limits and only where there is a match."""
+
+import json
+import re
+from importlib import resources
 
 import cv2
 import numpy as np
@@ -6,57 +10,177 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stereogrid.matching.sigma import FLOOR_PX, GREY_NOISE, LARGEST_PX, disparity_sigma_px
+from stereogrid.errors import InvalidInputError
+from stereogrid.matching import MATCHERS, matcher
+from stereogrid.matching.sigma import (
+    GENERIC,
+    KNOTS,
+    LARGEST_PX,
+    SMALLEST_PX,
+    SigmaTable,
+    disparity_sigma_px,
+    rows,
+    sigma_tables,
+)
+from stereogrid.matching.sigma_cues import CUES, cues, look_up
+
+SHAPE = (60, 100)
 
 
-@given(st.integers(1, 12), st.sampled_from([3, 5, 9, 15]))
-def test_a_ramp_has_the_sigma_of_its_slope_and_window(slope, block_px):
-    """Slope s over n x n pixels: sigma^2 = floor^2 + 2 / (n s)^2."""
-    ramp = np.tile(np.arange(20) * slope, (20, 1)).astype(np.uint8)
-    sigma = disparity_sigma_px(ramp, block_px)[10, 10]
-    energy = (block_px * slope) ** 2
-    assert sigma == pytest.approx(np.sqrt(FLOOR_PX**2 + 2 * GREY_NOISE**2 / energy), rel=1e-5)
+def table(**parts):
+    """A table of zeros but for these cues."""
+    return SigmaTable({cue: tuple(parts.get(cue, (0.0,) * len(KNOTS[cue]))) for cue in CUES})
 
 
-@pytest.mark.parametrize("slope", [0.4, 1.0, 4.0])
-def test_beside_the_floor_it_is_the_scatter_of_least_squares_shifts_with_that_grey_noise(slope):
-    """Monte Carlo: shift one noisy 9 x 9 window onto the other, sum(gradient x difference) / sum(gradient^2)."""
-    rng = np.random.default_rng(4)
-    texture = cv2.GaussianBlur(rng.normal(size=(15, 15)), (0, 0), 2)
-    texture *= slope / np.abs(np.gradient(texture, axis=1)).mean()
-    gradient = cv2.Sobel(texture, cv2.CV_64F, 1, 0, ksize=3, scale=1 / 8)[3:-3, 3:-3]
-    noise_left, noise_right = rng.normal(0, GREY_NOISE, (2, 20_000, 9, 9))
-    shifts = ((noise_left - noise_right) * gradient).sum(axis=(1, 2)) / (gradient**2).sum()
-    grey = np.clip(np.rint(128 + texture), 0, 255).astype(np.uint8)
-    predicted = np.sqrt(disparity_sigma_px(grey, 9)[7, 7] ** 2 - FLOOR_PX**2)
-    # Whole grey levels change the gradients of the faintest texture a little.
-    assert predicted == pytest.approx(shifts.std(), rel=0.15 if slope < 1 else 0.05)
+def scene(noise_grey=0.0, shape=SHAPE, shift_px=5, seed=0):
+    """A textured pair shifted by whole pixels, and its disparity with a hole."""
+    rng = np.random.default_rng(seed)
+    texture = cv2.GaussianBlur(rng.normal(size=(shape[0], shape[1] + 20)), (0, 0), 1.5)
+    wide = 120 + 25 * texture / texture.std()
+    noisy = [
+        part + rng.normal(0, noise_grey, shape) for part in (wide[:, : shape[1]], wide[:, shift_px:][:, : shape[1]])
+    ]
+    left, right = (np.clip(np.rint(part), 0, 255).astype(np.uint8) for part in noisy)
+    disparity_px = np.full(shape, shift_px, np.float32)
+    disparity_px[:, :shift_px] = disparity_px[20:30, 40:55] = np.nan
+    return left, right, disparity_px
 
 
-def test_more_contrast_is_never_less_certain():
-    texture = cv2.GaussianBlur(np.random.default_rng(5).normal(size=(40, 60)), (0, 0), 1.5)
-    texture /= np.abs(texture).max()
-    sigmas = [disparity_sigma_px(np.rint(128 + c * texture).astype(np.uint8), 9).mean() for c in (2, 8, 30, 120)]
-    assert (np.diff(sigmas) < 0).all()
+def looked_up(values, chosen):
+    """What the kernel gives for one pixel with these values of the cues."""
+    out = np.zeros((1, 1), np.float32)
+    limits = np.array([SMALLEST_PX, LARGEST_PX], np.float32)
+    look_up(np.array(values, np.float32)[:, None, None], rows(KNOTS), rows(chosen.log_sigma), limits, out)
+    return float(out[0, 0])
 
 
-@given(st.integers(0, 255), st.sampled_from([3, 9, 21]))
-def test_an_even_image_says_it_knows_nothing(grey, block_px):
-    sigma = disparity_sigma_px(np.full((12, 16), grey, np.uint8), block_px)
-    np.testing.assert_array_equal(sigma, np.float32(LARGEST_PX))
+parts = st.tuples(*(st.floats(-1, 1) for _ in range(6)))
+at_cues = st.tuples(*(st.floats(0, 2 * KNOTS[cue][-1], width=32) for cue in CUES))
+
+
+@given(st.fixed_dictionaries(dict.fromkeys(CUES, parts)), at_cues)
+def test_the_kernel_is_its_numpy_twin(log_sigma, values):
+    """Straight lines between the knots, level outside, and in proportion to the shift beyond its last one."""
+    total = sum(np.interp(value, KNOTS[cue], log_sigma[cue]) for cue, value in zip(CUES, values, strict=True))
+    beyond = max(values[CUES.index("shift_px")] / KNOTS["shift_px"][-1], 1)
+    expected = np.clip(np.exp(total) * beyond, SMALLEST_PX, LARGEST_PX)
+    assert looked_up(values, SigmaTable(log_sigma)) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", [*sorted(MATCHERS), "a plug-in of somebody's"])
+def test_sigma_is_missing_exactly_where_disparity_is_and_within_its_limits_elsewhere(name):
+    left, right, disparity_px = scene(noise_grey=2)
+    before = disparity_px.copy()
+    sigma_px = disparity_sigma_px(left, right, disparity_px, matcher=name)
+    assert (sigma_px.shape, sigma_px.dtype) == (SHAPE, np.float32)
+    np.testing.assert_array_equal(np.isnan(sigma_px), np.isnan(disparity_px))
+    found = sigma_px[~np.isnan(sigma_px)]
+    assert found.min() >= np.float32(SMALLEST_PX)
+    assert found.max() <= LARGEST_PX
+    np.testing.assert_array_equal(disparity_px, before)
+
+
+def test_a_disparity_without_any_match_has_no_sigma():
+    left, right, _ = scene()
+    sigma_px = disparity_sigma_px(left, right, np.full(SHAPE, np.nan, np.float32), matcher="bm")
+    assert np.isnan(sigma_px).all()
+
+
+@given(st.integers(1, 12), st.integers(1, 12))
+def test_images_of_any_size_have_a_sigma(height, width):
+    image = np.zeros((height, width), np.uint8)
+    sigma_px = disparity_sigma_px(image, image, np.full((height, width), 0.5, np.float32), matcher="bm")
+    np.testing.assert_array_equal(sigma_px, np.float32(LARGEST_PX))
+
+
+@given(st.integers(0, 255), st.integers(0, 255), st.sampled_from(sorted(sigma_tables())))
+def test_even_images_say_that_nothing_is_known(grey_left, grey_right, name):
+    images = (np.full((12, 16), grey, np.uint8) for grey in (grey_left, grey_right))
+    sigma_px = disparity_sigma_px(*images, np.full((12, 16), 3, np.float32), matcher=name)
+    np.testing.assert_array_equal(sigma_px, np.float32(LARGEST_PX))
 
 
 def test_edges_along_the_rows_do_not_help_to_match_along_the_rows():
     stripes = np.repeat(np.array([0, 0, 0, 255, 255, 255] * 3, np.uint8)[:, None], 20, axis=1)
-    np.testing.assert_array_equal(disparity_sigma_px(stripes, 9), np.float32(LARGEST_PX))
-    assert disparity_sigma_px(np.ascontiguousarray(stripes.T), 9).max() < 0.31
+    disparity_px = np.full(stripes.shape, 3, np.float32)
+    np.testing.assert_array_equal(disparity_sigma_px(stripes, stripes, disparity_px, matcher="bm"), LARGEST_PX)
 
 
-def test_it_is_float32_of_the_image_size_between_floor_and_largest_and_spares_the_image():
-    image = np.random.default_rng(6).integers(0, 256, (30, 41), dtype=np.uint8)
-    before = image.copy()
-    sigma = disparity_sigma_px(image, 5)
-    assert (sigma.shape, sigma.dtype) == ((30, 41), np.float32)
-    assert sigma.min() >= np.float32(FLOOR_PX)
-    assert sigma.max() <= LARGEST_PX
-    np.testing.assert_array_equal(image, before)
+@pytest.mark.parametrize("name", ["bm", "sgbm", GENERIC])
+def test_noisier_images_and_rougher_disparities_are_less_certain(name):
+    medians = []
+    for noise in (0, 3, 8):
+        left, right, disparity_px = scene(noise_grey=noise)
+        rough = disparity_px + np.random.default_rng(1).normal(0, 0.05 * noise, SHAPE).astype(np.float32)
+        medians.append(np.nanmedian(disparity_sigma_px(left, right, rough, matcher=name)))
+    assert (np.diff(medians) > 0).all()
+
+
+@pytest.mark.parametrize("name", ["bm", "sgbm", GENERIC])
+def test_a_patch_that_was_matched_wrongly_stands_out(name):
+    left, right, disparity_px = scene(noise_grey=1)
+    disparity_px[40:48, 60:72] = 13
+    sigma_px = disparity_sigma_px(left, right, disparity_px, matcher=name)
+    assert np.median(sigma_px[40:48, 60:72]) > 3 * np.median(sigma_px[10:20, 60:80])
+
+
+def test_a_gain_or_an_offset_between_the_cameras_does_not_matter():
+    left, right, disparity_px = scene(noise_grey=2)
+    plain = disparity_sigma_px(left, right, disparity_px, matcher="bm")
+    brighter = np.clip(right.astype(int) + 20, 0, 255).astype(np.uint8)
+    np.testing.assert_allclose(disparity_sigma_px(left, brighter, disparity_px, matcher="bm"), plain, rtol=0.05)
+
+
+def test_each_matcher_uses_the_table_of_its_own_name():
+    left, right, _ = scene(noise_grey=2, shape=(60, 120))
+    for name in sorted(set(MATCHERS) & set(sigma_tables())):
+        found = matcher(name, num_disparities=16).match(left, right)
+        own = sigma_tables()[name].sigma_px(left, right, found.disparity_px)
+        np.testing.assert_array_equal(found.sigma_px, own)
+
+
+def test_matchers_without_a_table_have_the_generic_one():
+    left, right, disparity_px = scene(noise_grey=2)
+    generic = sigma_tables()[GENERIC].sigma_px(left, right, disparity_px)
+    np.testing.assert_array_equal(disparity_sigma_px(left, right, disparity_px, matcher="a plug-in"), generic)
+
+
+def test_the_committed_tables_say_how_they_were_made():
+    text = resources.files("stereogrid.matching").joinpath("sigma_tables.json").read_text(encoding="utf-8")
+    held = json.loads(text)
+    assert held["command"].startswith("python -m experiments sigma")
+    assert {"bm", "sgbm", GENERIC} <= set(held["tables"])
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"gradient": None}, "a sigma table needs the cues roughness_px, .*gradient"),
+        ({"texture": (0.0,) * 6}, "a sigma table needs the cues"),
+        ({"gradient": (0.0,) * 5}, "gradient: expected 6 finite numbers"),
+        ({"gradient": (0.0,) * 5 + (np.nan,)}, "gradient: expected 6 finite numbers"),
+    ],
+)
+def test_a_table_that_is_not_whole_is_refused_naming_the_cue(changed, message):
+    held = {**table().log_sigma, **changed}
+    with pytest.raises(InvalidInputError, match=message):
+        SigmaTable({cue: parts for cue, parts in held.items() if parts is not None})
+
+
+@pytest.mark.parametrize("name", ["venus", "teddy"])
+@pytest.mark.parametrize("kind", ["bm", "sgbm"])
+def test_errors_on_real_pairs_are_covered(real_data, name, kind):
+    """The tables are fitted to these very pairs; how others fare is the experiment's to say."""
+    from experiments.pairs import open_pair
+
+    pair = open_pair(real_data(f"stereo/{name}"))
+    found = matcher(kind, num_disparities=64).match(*pair.grey)
+    judged = pair.visible & found.valid
+    error_px = np.abs(found.disparity_px - pair.truth_px)[judged]
+    wide_px = np.hypot(found.sigma_px[judged], pair.step_px / np.sqrt(12))
+    assert 100 * np.mean(error_px <= wide_px) == pytest.approx(68, abs=4)
+    assert 100 * np.mean(error_px <= 2 * wide_px) == pytest.approx(95, abs=5)
+
+
+def test_the_docstring_of_the_cues_names_them_all():
+    assert all(re.search(rf"\b{cue}\b", cues.__doc__) for cue in CUES)

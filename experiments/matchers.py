@@ -1,0 +1,110 @@
+"""The comparison of matchers: on pairs whose disparity is known, and by the map that each makes of one drive.
+
+Every matcher sees the same pairs, and the same drive with the same true poses and the same image noise, seed by
+seed; so a difference between two maps is one between their matchers.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sim.noise import image_noise
+from sim.rig import MINORU
+from stereogrid.config import GridConfig, MappingConfig, save_config
+from stereogrid.errors import InvalidInputError, unknown_name
+from stereogrid.recording import open_recording
+from stereogrid.report import ReportTable
+from stereogrid.runs import finished_path, run_folder
+from stereogrid.sensor_model import SensorModel
+
+from .contenders import Contender, default_table, read_contenders
+from .drives import DriveConfig, about, record
+from .matched_maps import Seeing, map_drive, truth_of
+from .matched_pairs import PairResult, at_most, match_pairs
+from .matchers_report import write_results
+from .pairs import Pair, open_pairs
+from .parallel import Stage
+
+
+@dataclass(frozen=True)
+class MatchersConfig:
+    """Every parameter of the experiment; the file config.toml of a run holds them.
+
+    reference: the contender that the others are compared with. most_pixels: larger pairs are shrunk. n_seeds: image
+    noise is drawn with the seeds 1, 2, ... n_seeds. image_noise: a preset of sim.noise. num_disparities: searched on
+    the drive. contenders: sections as contenders.Contender has them, by name.
+    """
+
+    reference: str = "bm"
+    most_pixels: int = 400_000
+    n_seeds: int = 5
+    image_noise: str = "mild"
+    num_disparities: int = 80
+    drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=10.0))
+    model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
+    grid: GridConfig = field(default_factory=lambda: GridConfig(cell_m=0.05))
+    contenders: dict = field(default_factory=default_table)
+
+    def __post_init__(self) -> None:
+        image_noise(self.image_noise)
+        for name in ("most_pixels", "n_seeds", "num_disparities"):
+            if not getattr(self, name) > 0:
+                raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
+        if self.reference not in self.contenders:
+            raise unknown_name("contender", self.reference, self.contenders)
+        for contender in self.contending.values():
+            contender.make(self.num_disparities)
+        self.seeing.mapping.build_mapper(MINORU)
+
+    @property
+    def contending(self) -> dict[str, Contender]:
+        """The contenders by name."""
+        return read_contenders(self.contenders)
+
+    @property
+    def seeing(self) -> Seeing:
+        """How the drive is seen and mapped."""
+        mapping = MappingConfig(model=self.model, grid=self.grid)
+        return Seeing(mapping, self.image_noise, tuple(range(1, self.n_seeds + 1)), self.num_disparities)
+
+
+def run(
+    config: MatchersConfig,
+    stage: Stage,
+    *,
+    runs: Path,
+    pairs: Path | None = None,
+    recording: Path | None = None,
+    command: str = "",
+) -> tuple[Path, list[ReportTable]]:
+    """Compare the contenders on the pairs and by the map; the run folder and the tables for the screen.
+
+    pairs: a folder of pairs, none: default_pairs(). recording: a drive to be used instead of a new one.
+    """
+    place = pairs or default_pairs()
+    known = [at_most(pair, config.most_pixels) for pair in open_pairs(place)] if place else []
+    reused = open_recording(recording) if recording else None
+    with run_folder(runs, "matchers") as folder:
+        save_config(config, folder / "config.toml")
+        drive = reused or open_recording(record(config.drive, folder / "drive.mcap", stage))
+        truth = truth_of(drive, config.seeing, stage)  # first: a drive without a truth is refused at once
+        on_pairs = compare_on_pairs(known, config, stage)
+        by_map = map_drive(drive, truth, config.contending, seeing=config.seeing, stage=stage)
+        facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
+        with stage("drawing", 1):
+            tables = write_results(folder, on_pairs, by_map, config.reference, facts=facts)
+    return finished_path(folder), tables
+
+
+def default_pairs() -> Path | None:
+    """$STEREOGRID_DATA/stereo, where that is a folder."""
+    root = os.environ.get("STEREOGRID_DATA")
+    return Path(root, "stereo") if root and Path(root, "stereo").is_dir() else None
+
+
+def compare_on_pairs(pairs: Sequence[Pair], config: MatchersConfig, stage: Stage) -> list[PairResult]:
+    """Every contender on every pair."""
+    contenders = config.contending
+    with stage("matching pairs", len(pairs) * len(contenders)) as step:
+        return match_pairs(pairs, contenders, step)
