@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test lint types layers format wheel-check clean
+.PHONY: demo test bench lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -11,6 +11,11 @@ demo: .venv/ready
 
 test: .venv/ready
 	$(PYTHON) -m pytest
+
+# Minutes on 2 cores; needs STEREOGRID_DATA, the folder of the real data.
+bench: .venv/ready
+	$(PYTHON) -m experiments energy --pairs $(STEREOGRID_DATA)/stereo
+	$(PYTHON) -m experiments matchers
 
 lint: .venv/ready
 	.venv/bin/ruff check .

@@ -101,6 +101,23 @@ def sigma(
     console.print(f"{folder} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True)
 
 
+@app.command(epilog="Example: python -m experiments energy --pairs ../shared/data/stereo")
+def energy(
+    pairs: Annotated[Path, typer.Option(help="Folder of pairs with known disparity, one folder each.")],
+) -> None:
+    """Compare kz2's energies and times with those of the published reference."""
+    from .energy import compare
+    from .parallel import rich_stage
+
+    table = Table("pair", "energy", "less the reference's best", "CPU s", "wall s", "CPU / reference's", box=None)
+    for result in compare(pairs, rich_stage):
+        best, seconds = result.reference or (None, None)
+        relation = ("-", "-") if best is None else (f"{result.energy - best}", f"{result.cpu_s / seconds:.2f}")
+        times = (f"{result.cpu_s:.1f}", f"{result.wall_s:.1f}")
+        table.add_row(result.pair, str(result.energy), relation[0], *times, relation[1])
+    Console().print(table)
+
+
 @app.command(epilog="Example: python -m experiments pictures runs/latest")
 def pictures(
     run: Annotated[Path, typer.Argument(help="A run of the corridor experiment, with its drive.mcap.")],

@@ -41,7 +41,7 @@ class MatchersConfig:
     n_seeds: int = 5
     image_noise: str = "mild"
     num_disparities: int = 80
-    drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=10.0))
+    drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
     model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
     grid: GridConfig = field(default_factory=lambda: GridConfig(cell_m=0.05))
     contenders: dict = field(default_factory=default_table)

@@ -1,5 +1,6 @@
 """The two images of a pair: checked, in grey, in the same tones."""
 
+from numbers import Integral
 from typing import Any
 
 import cv2
@@ -14,6 +15,14 @@ LARGEST_GAIN = 2.0
 """Beyond it, the images show different things rather than the same in other tones."""
 LIKE_GAIN, LIKE_OFFSET = 0.03, 3.0
 """By so much the spread (a share) and the mean (grey levels) of two views differ in any case."""
+
+
+def check_num_disparities(num_disparities: Any) -> None:
+    """Raise InvalidInputError unless it is an integer of at least 1."""
+    if isinstance(num_disparities, bool) or not isinstance(num_disparities, Integral):
+        raise InvalidInputError(f"num_disparities must be an integer, not {num_disparities!r}")
+    if num_disparities < 1:
+        raise InvalidInputError(f"num_disparities must be at least 1, not {num_disparities}")
 
 
 def check_images(left: Any, right: Any, num_disparities: int) -> tuple[Image, Image]:

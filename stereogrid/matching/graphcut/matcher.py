@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...errors import InvalidInputError
 from ...observation import Disparity, FloatImage, Image
 from ..census import Side, shares_around, side_of
-from ..images import check_images, grey_of, toned_as
+from ..images import check_images, check_num_disparities, grey_of, toned_as
 from ..meter import Meter, check_time_budget
 from ..sigma import disparity_sigma_px
 from .aggregation import SCALE, line_means, weight_tables
@@ -66,8 +66,7 @@ class GraphCutMatcher:
         time_budget_s: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        if num_disparities < 1:
-            raise InvalidInputError(f"num_disparities must be at least 1, not {num_disparities}")
+        check_num_disparities(num_disparities)
         if not 0 <= smoothness <= LARGEST_SMOOTHNESS:
             raise InvalidInputError(f"smoothness must be 0 to {LARGEST_SMOOTHNESS}, not {smoothness}")
         check_time_budget(time_budget_s)

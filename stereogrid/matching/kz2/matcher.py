@@ -5,10 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...errors import InvalidInputError
 from ...observation import Disparity, Image
 from ..census import shares_around, side_of
-from ..images import check_images
+from ..images import check_images, check_num_disparities
 from ..meter import check_time_budget
 from ..sigma import disparity_sigma_px
 from .cost import energy_of_pair
@@ -36,8 +35,7 @@ class KolmogorovZabihMatcher:
         time_budget_s: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        if num_disparities < 1:
-            raise InvalidInputError(f"num_disparities must be at least 1, not {num_disparities}")
+        check_num_disparities(num_disparities)
         check_time_budget(time_budget_s)
         self.num_disparities, self.subpixel = num_disparities, subpixel
         self.time_budget_s, self.progress = time_budget_s, progress
@@ -64,7 +62,7 @@ class KolmogorovZabihMatcher:
     def labels(self, left: Image, right: Image) -> tuple[LabelImage, int]:
         """The labelling (H, W) int16, -1 = unmatched, and its energy in the units of the reference (see cost.py).
 
-        A pair without any contrast has no labelling better than another: all is unmatched, at energy 0.
+        Of a pair without any contrast the labels say nothing; match leaves them out.
         """
         images = check_images(left, right, self.num_disparities)
         deadline_s = np.inf if self.time_budget_s is None else time.monotonic() + self.time_budget_s

@@ -34,6 +34,8 @@ AGAIN_PX = 5
 NUDGES = (0.0, -0.03, 0.03)
 """Of the height, in turn: how far from the middle of the work the image is split. The row between the two parts keeps
 its labels while both are worked on, so that it must not be the same in each cycle."""
+LEAST_SPLIT_ROWS = 34
+"""An image of fewer rows is not split: the nudges would be less than a row."""
 
 
 @dataclass
@@ -95,7 +97,8 @@ def descend(
     start = search.labels.label.copy()
     middle = 0.5
     for cycle, where in enumerate(plan):
-        split = int(height * min(max(middle + NUDGES[cycle % len(NUDGES)], 0.1), 0.9))
+        share = min(max(middle + NUDGES[cycle % len(NUDGES)], 0.1), 0.9) if height >= LEAST_SPLIT_ROWS else 1
+        split = int(height * share)
         halves = [pool.submit(_cycle, search, order, rows, (where, start, number)) for rows in _parts(split, height)]
         above, below = (half.result() for half in halves)
         gains = [gain for gain, _ in above + below if gain > 0]
@@ -111,8 +114,8 @@ def descend(
 
 
 def _parts(split: int, height: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The rows above and below the row that splits them."""
-    return (0, split), (split + 1, height)
+    """The rows above and below the row that splits them; none below where that is the height."""
+    return (0, split), (min(split + 1, height), height)
 
 
 def _middle(split: float, above: int, below: int) -> float:
@@ -137,7 +140,9 @@ def offer(search: Search, other: LabelImage) -> None:
 def _cycle(
     search: Search, order: NDArray[np.int64], rows: tuple[int, int], turn: tuple[str, LabelImage, int]
 ) -> list[tuple[int, int]]:
-    """One move a label between two rows: of each how far the energy fell, and the work."""
+    """One move a label between two rows, if there are any: of each how far the energy fell, and the work."""
+    if rows[0] == rows[1]:
+        return []
     where, start, number = turn
     graph = empty_graph(rows[1] - rows[0], start.shape[1], 2)
     done = []

@@ -2,11 +2,16 @@
 
 import itertools
 
+import cv2
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_flow as scipy_maximum_flow
 
+from stereogrid.matching.graphcut.expansion import edge_weights, move_graph
+from stereogrid.matching.kz2 import moves
+from stereogrid.matching.kz2.cost import energy_of_pair
+from stereogrid.matching.kz2.start import good_start
 from stereogrid.matching.maxflow import Graph, empty_graph, maximum_flow, source_side
 
 
@@ -33,18 +38,22 @@ def random_graph(rng, height, width, layers, largest=9):
     return graph
 
 
-def capacities(graph):
-    """(N + 2, N + 2): between all nodes, the source (N) and the sink (N + 1)."""
+def sparse_capacities(graph):
+    """(N + 2, N + 2) csr: between all nodes, the source (N) and the sink (N + 1)."""
     count = graph.terminal.size
-    matrix = np.zeros((count + 2, count + 2), np.int32)
-    matrix[count, :count] = np.maximum(graph.terminal, 0)
-    matrix[:count, count + 1] = np.maximum(-graph.terminal, 0)
     node = np.arange(count)
     heads = [*(node + graph.offset[:, None]), node ^ 1, graph.across]
-    for arc in range(graph.capacity.shape[1]):
-        used = graph.capacity[:, arc] > 0
-        np.add.at(matrix, (node[used], heads[arc][used]), graph.capacity[used, arc])
-    return matrix
+    arcs = [(np.full(count, count), node, np.maximum(graph.terminal, 0))]
+    arcs.append((node, np.full(count, count + 1), np.maximum(-graph.terminal, 0)))
+    arcs += [(node, heads[arc], graph.capacity[:, arc]) for arc in range(graph.capacity.shape[1])]
+    tail, head, capacity = (np.concatenate(each) for each in zip(*arcs, strict=True))
+    used = capacity > 0
+    return csr_matrix((capacity[used].astype(np.int32), (tail[used], head[used])), shape=(count + 2, count + 2))
+
+
+def capacities(graph):
+    """The same as an array."""
+    return sparse_capacities(graph).toarray()
 
 
 def cut_value(matrix, sink_side):
@@ -122,22 +131,102 @@ def test_a_snake_as_long_as_the_grid_is_followed_to_its_end():
     assert maximum_flow(graph)[0] == 5
 
 
+def flow_of_pymaxflow(graph):
+    maxflow = pytest.importorskip("maxflow", reason="needs PyMaxflow (GPL, the extra `oracle`)")
+    count, arcs = graph.terminal.size, sparse_capacities(graph).tocoo()
+    reference = maxflow.Graph[int](count, arcs.nnz)
+    reference.add_nodes(count)
+    for tail, head, capacity in zip(arcs.row.tolist(), arcs.col.tolist(), arcs.data.tolist(), strict=True):
+        if tail == count:
+            reference.add_tedge(head, capacity, 0)
+        elif head == count + 1:
+            reference.add_tedge(tail, 0, capacity)
+        else:
+            reference.add_edge(tail, head, capacity, 0)
+    return reference.maxflow()
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_grid_of_the_size_of_an_image_agrees_with_pymaxflow(seed):
-    maxflow = pytest.importorskip("maxflow", reason="needs PyMaxflow (GPL, the extra `oracle`)")
-    height, width = 120, 160
-    graph = random_graph(np.random.default_rng(seed), height, width, 1, largest=1000)
-    nodes = nodes_of(height, width, 1)
-    reference = maxflow.Graph[int](nodes.size, 4 * nodes.size)
-    reference.add_nodes(nodes.size)
-    index = np.full(graph.terminal.size, -1)
-    index[nodes] = np.arange(nodes.size)
-    for node in nodes:
-        weight = int(graph.terminal[node])
-        reference.add_tedge(index[node], max(weight, 0), max(-weight, 0))
-        for arc in (0, 2):
-            other = node + graph.offset[arc]
-            if index[other] >= 0:
-                forth, back = int(graph.capacity[node, arc]), int(graph.capacity[other, arc + 1])
-                reference.add_edge(index[node], index[other], forth, back)
-    assert maximum_flow(graph)[0] == reference.maxflow()
+    graph = random_graph(np.random.default_rng(seed), 120, 160, 1, largest=1000)
+    expected = flow_of_pymaxflow(graph)
+    assert maximum_flow(graph)[0] == expected
+
+
+def rendered_pair(seed, shape=(90, 130)):
+    """(left, right) (H, W) uint8: a textured square of disparity 9 before a wall of disparity 3, with noise."""
+    rng = np.random.default_rng(seed)
+    wall, near = (cv2.GaussianBlur(rng.normal(0, 120, (shape[0], shape[1] + 20)), (0, 0), 1.2) for _ in range(2))
+    left, right = wall[:, : shape[1]].copy(), wall[:, 3 : shape[1] + 3].copy()
+    left[20:70, 50:90], right[20:70, 41:81] = near[20:70, 50:90], near[20:70, 41:81]
+    return tuple(np.clip(np.rint(128 + i + rng.normal(0, 4, shape)), 0, 255).astype(np.uint8) for i in (left, right))
+
+
+def graph_of_gc(label, count=12):
+    """An expansion of the graph-cut matcher's energy on plain differences, away from the cheapest labels."""
+    left, right = rendered_pair(label)
+    costs = np.full((*left.shape, count), 150, np.uint16)
+    for d in range(count):
+        difference = np.abs(left[:, d:].astype(np.int16) - right[:, : left.shape[1] - d])
+        costs[:, d:, d] = cv2.blur(np.minimum(difference, 60), (3, 3))
+    labels = costs.argmin(axis=2).astype(np.int32)
+    box, free = np.array([0, left.shape[0], 0, left.shape[1]]), labels != label
+    return move_graph(costs, edge_weights(left[..., None], 12, (10, 4)), (6, label), labels, (box, free))
+
+
+def graph_of_kz2(label, count=12):
+    """An expansion of kz2's energy from a good start, or a move to a labelling shifted by a row (label -1)."""
+    energy, _ = energy_of_pair(*rendered_pair(label + 1), count)
+    start = good_start(energy)
+    labels = moves.labels_of(energy, start)
+    proposal = np.full(start.shape, label, np.int16)
+    proposal[:, :label] = moves.UNMATCHED
+    if label < 0:
+        shifted = np.roll(start, 1, axis=0)
+        proposal = np.where(shifted == start, np.int16(moves.UNMATCHED), shifted)
+    graph = empty_graph(*start.shape, 2)
+    move = moves.Move(energy, labels, proposal, moves._kinds(labels, proposal, 0), graph, 0)
+    moves._clear(graph)
+    moves._add_keeps(move)
+    moves._add_takes(move)
+    moves._forbid_doubles(move)
+    return graph, move
+
+
+def flow_of_scipy(graph):
+    matrix = sparse_capacities(graph)
+    return scipy_maximum_flow(matrix, matrix.shape[0] - 2, matrix.shape[0] - 1).flow_value
+
+
+REAL_GRAPHS = {
+    **{f"gc, label {d}": lambda d=d: graph_of_gc(d) for d in (2, 3, 9)},
+    **{f"kz2, label {d}": lambda d=d: graph_of_kz2(d)[0] for d in (2, 3, 9)},
+    "kz2, another labelling": lambda: graph_of_kz2(-1)[0],
+}
+
+
+@pytest.mark.parametrize("name", REAL_GRAPHS)
+def test_flow_and_both_cuts_of_a_matchers_move_equal_the_flow_that_scipy_finds(name):
+    graph = REAL_GRAPHS[name]()
+    matrix, expected = sparse_capacities(graph), flow_of_scipy(graph)
+    flow, sink_side, _ = maximum_flow(graph)
+    assert flow == expected > 0
+    for side in (sink_side, ~source_side(graph)):
+        assert 0 < side.sum() < side.size
+        assert cut_value(matrix, side) == expected
+
+
+@pytest.mark.parametrize("name", REAL_GRAPHS)
+def test_the_flow_of_a_matchers_move_agrees_with_pymaxflow(name):
+    graph = REAL_GRAPHS[name]()
+    expected = flow_of_pymaxflow(graph)
+    assert maximum_flow(graph)[0] == expected
+
+
+@pytest.mark.parametrize("label", [-1, 2, 3, 9])
+def test_what_kz2_pushes_along_direct_paths_first_is_part_of_the_maximum_flow(label):
+    graph, move = graph_of_kz2(label)
+    expected = flow_of_scipy(graph)
+    direct = moves._push_direct(move)
+    assert direct > 0
+    assert direct + maximum_flow(graph)[0] == expected
