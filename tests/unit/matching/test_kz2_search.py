@@ -117,10 +117,10 @@ def test_a_label_is_offered_to_its_region_alone():
 def test_of_two_first_matches_of_a_right_pixel_the_nearer_stays():
     label = np.array([0, 1, 0, 1, 3, UNMATCHED, 2], np.int16)
     _make_unique(label)
-    np.testing.assert_array_equal(label, [UNMATCHED, 1, UNMATCHED, UNMATCHED, 3, UNMATCHED, 2])
-    label = np.array([0, 0, 1, 1], np.int16)
+    np.testing.assert_array_equal(label, [UNMATCHED, 1, UNMATCHED, 1, 3, UNMATCHED, 2])
+    label = np.array([0, 0, 1, 3], np.int16)
     _make_unique(label)
-    np.testing.assert_array_equal(label, [0, UNMATCHED, 1, 1])
+    np.testing.assert_array_equal(label, [UNMATCHED, UNMATCHED, 1, 3])
 
 
 @pytest.mark.parametrize("rows", [LEAST_SPLIT_ROWS - 1, LEAST_SPLIT_ROWS, 48])
