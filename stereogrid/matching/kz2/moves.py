@@ -23,7 +23,7 @@ UNMATCHED = -1
 class Labels(NamedTuple):
     """A labelling and what the moves want to know of it.
 
-    label (H, W) int16: UNMATCHED or a disparity; cost (H, W) int16: of that match; owner (H, W) int16: of a right pixel
+    label (H, W) int16: UNMATCHED or a disparity; cost (H, W) int16: of that match; owner (H, W) int32: of a right pixel
     its left one's column, or UNMATCHED; changed (H, W) int32: the number of the last move that changed the label.
     """
 
@@ -47,7 +47,7 @@ class Move(NamedTuple):
 @njit(cache=True, nogil=True)
 def labels_of(energy: Energy, label: Array) -> Labels:
     """Labels of a labelling (H, W) int16 that has no right pixel twice; label itself is what moves will change."""
-    owner = np.full(label.shape, UNMATCHED, np.int16)
+    owner = np.full(label.shape, UNMATCHED, np.int32)
     cost = np.zeros(label.shape, np.int16)
     for y in range(label.shape[0]):
         for x in range(label.shape[1]):

@@ -156,14 +156,10 @@ def _add_differences(grid: Grid, edge: tuple[int, int, int], given: int, total: 
 @njit(cache=True, nogil=True)
 def _make_unique(label: Array) -> None:
     """Of two matches of a right pixel the nearer stays: the farther surface is the one that may be hidden."""
-    owner = np.full(label.size, UNMATCHED, np.int16)
+    owner = np.full(label.size, UNMATCHED, np.int32)
     for x in range(label.size):
-        d = label[x]
-        if d >= 0:
-            other = owner[x - d]
-            if other < 0 or label[other] < d:
-                if other >= 0:
-                    label[other] = UNMATCHED
-                owner[x - d] = x
-            else:
-                label[x] = UNMATCHED
+        if label[x] >= 0:
+            q = x - label[x]
+            if owner[q] >= 0:  # of the same right pixel, the match further to the right is the nearer one
+                label[owner[q]] = UNMATCHED
+            owner[q] = x
