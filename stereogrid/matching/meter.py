@@ -3,7 +3,6 @@
 import threading
 import time
 from collections.abc import Callable
-from numbers import Real
 from typing import Any
 
 from ..errors import InvalidInputError
@@ -11,7 +10,7 @@ from ..errors import InvalidInputError
 
 def check_time_budget(time_budget_s: Any) -> None:
     """Raise InvalidInputError unless the time is None, no limit, or at least 0 [s]."""
-    if time_budget_s is not None and not (isinstance(time_budget_s, Real) and time_budget_s >= 0):
+    if time_budget_s is not None and not (isinstance(time_budget_s, (int, float)) and time_budget_s >= 0):
         raise InvalidInputError(f"time_budget_s must be at least 0 or None, not {time_budget_s!r}")
 
 
