@@ -12,6 +12,8 @@ from stereogrid.observation import Image, Matcher
 
 from .pairs import Pair
 
+SEE_COLOUR = ("gc", "kz2")
+
 
 @dataclass(frozen=True)
 class Contender:
@@ -27,6 +29,10 @@ class Contender:
     options: dict = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.colour and self.matcher not in SEE_COLOUR:
+            raise InvalidInputError(f"colour = true: of the matchers only {', '.join(SEE_COLOUR)} see colour")
+        if "num_disparities" in self.options:
+            raise InvalidInputError("options: num_disparities follows from the pair, by labels_step")
         if self.labels_step < 0:
             raise InvalidInputError(f"labels_step must be >= 0, not {self.labels_step}")
 
@@ -51,7 +57,7 @@ CONTENDERS = {
     "gc": Contender("gc"),
 }
 """The matchers that need nothing but images. One with a network of the user's comes in through the config:
-[contenders.hitnet] with matcher = "onnx", colour = true and options = { network = "hitnet.toml" }.
+[contenders.hitnet] with matcher = "onnx" and options = { network = "hitnet.toml" }.
 """
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from stereogrid.errors import InvalidInputError
 from stereogrid.observation import Disparity, Image, Matcher
 from stereogrid.scoring import Score
 from stereogrid.scoring.disparity import disparity_scores, occlusion_f1, sigma_coverage
@@ -46,7 +47,10 @@ def match_pairs(
     results = []
     for pair in pairs:
         for name, contender in contenders.items():
-            found, times = timed(contender.make(pair.num_disparities), contender.images(pair))
+            try:
+                found, times = timed(contender.make(pair.num_disparities), contender.images(pair))
+            except InvalidInputError as error:
+                raise InvalidInputError(f"{name} on the pair {pair.name}: {error}") from None
             scores = [*score_pair(found, pair), *times]
             results.append(PairResult(pair, name, contender.labels(pair.num_disparities), found, scores))
             step()

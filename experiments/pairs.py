@@ -111,7 +111,7 @@ def _scale_and_last(path: Path) -> tuple[float, int]:
     """What info.txt holds: grey levels a pixel of disparity, and the largest label."""
     try:
         scale, last = path.read_text(encoding="ascii").split()
-        if float(scale) > 0 and int(last) > 0:
+        if 0 < float(scale) < np.inf and int(last) > 0:
             return float(scale), int(last)
     except (OSError, ValueError):
         pass

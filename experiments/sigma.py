@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import stereogrid.matching.sigma
-from stereogrid.errors import InvalidInputError
+from stereogrid.errors import InvalidInputError, unknown_name
 from stereogrid.figures import save_figure
 from stereogrid.files import written_beside
 from stereogrid.matching import MATCHERS, matcher
@@ -68,7 +68,11 @@ def run(
 
     write: replace their tables in TABLES; GENERIC's too when no matcher is named.
     """
-    chosen = tuple(names) or tuple(name for name in MATCHERS if name not in WITHOUT_TABLE)
+    with_table = tuple(name for name in MATCHERS if name not in WITHOUT_TABLE)
+    chosen = tuple(names) or with_table
+    for name in chosen:
+        if name not in with_table:
+            raise unknown_name("matcher with a table", name, with_table)
     with run_folder(runs, "sigma") as folder:
         with stage("preparing scenes", 1):
             seen = list(scenes(data))

@@ -45,7 +45,7 @@ def map_command(
     recording: RecordingPath,
     out: Annotated[Path | None, typer.Option(help="Also save the map here (.sgrid).")] = None,
     config: Annotated[Path | None, typer.Option(help="A config.toml; the options below override it.")] = None,
-    matcher: Annotated[str | None, typer.Option(help="bm, sgbm or onnx.")] = None,
+    matcher: Annotated[str | None, typer.Option(help="bm, sgbm, gc, kz2 or onnx.")] = None,
     network: Annotated[Path | None, typer.Option(help="The TOML file that describes onnx's network.")] = None,
     num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
     cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
@@ -185,8 +185,9 @@ def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         command(args=arguments)
-    except StereogridError as error:
-        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+    except (StereogridError, MemoryError) as error:
+        what = error if isinstance(error, StereogridError) else f"not enough memory: {error}"
+        print(f"error: {what}", file=sys.stderr)  # noqa: T201
         return 1
     except SystemExit as stop:  # how typer ends, well or not
         if stop.code == INTERRUPTED:

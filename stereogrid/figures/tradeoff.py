@@ -12,6 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 MARKERS = "os^DvPX*"
+ROOM_FOR_FIVES = 2000.0
+"""An axis that spans more has labels at powers of ten alone."""
 Colour = tuple[float, float, float, float]
 
 
@@ -66,7 +68,8 @@ def _mark(axes: Axes, p: TradeoffPoint, marker: str, colour: Colour) -> None:
 
 
 def _label_plainly(axis: Axis) -> None:
-    """Plain numbers at 1, 2 and 5 times the powers of ten of a logarithmic axis."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    """Plain numbers at 1, 2 and 5 times the powers of ten of a logarithmic axis; at 1 alone where they would touch."""
+    low, high = axis.get_view_interval()
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < ROOM_FOR_FIVES * low else (1,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

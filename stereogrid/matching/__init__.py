@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from ..errors import InvalidInputError, unknown_name
+from ..errors import InvalidInputError, StereogridError, unknown_name
 from ..observation import Matcher
 from .block import BlockMatcher
 from .graphcut import GraphCutMatcher
@@ -29,7 +29,12 @@ def matcher(name: str, **options: Any) -> Matcher:
     for option in options:
         if option not in known:
             raise InvalidInputError(f"matcher {name!r} has no option {option!r}; choose from: {', '.join(known)}")
-    return MATCHERS[name](**options)
+    try:
+        return MATCHERS[name](**options)
+    except StereogridError:
+        raise
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(f"matcher {name!r} cannot be made with {options}: {error}") from error
 
 
 __all__ = [

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from ..errors import InvalidInputError
-from ..observation import Image, check_pair
+from ..observation import Disparity, Image, check_pair
 
 WINDOW_COLUMNS, WINDOW_ROWS = 9, 7
 """An image must hold the search and a window so large [px]."""
@@ -37,6 +37,17 @@ def check_images(left: Any, right: Any, num_disparities: int) -> tuple[Image, Im
         )
     first, second = (np.ascontiguousarray(i.reshape(height, width, -1)) for i in (left, right))
     return first, second
+
+
+def is_blank(left: Image, right: Image) -> bool:
+    """Whether one of the images is even all over, as a covered lens makes it: then nothing can be known."""
+    return any(bool((image == image[:1, :1]).all()) for image in (left, right))
+
+
+def nothing_known(image: Image) -> Disparity:
+    """The disparity of a pair in which nothing matches, for images (H, W) or (H, W, channels)."""
+    unknown = np.full(image.shape[:2], np.nan, np.float32)
+    return Disparity(unknown, unknown)
 
 
 def grey_of(image: Image) -> Image:

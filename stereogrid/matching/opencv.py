@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInputError
 from ..observation import Disparity, Image, check_pair
+from .images import is_blank, nothing_known
 from .sigma import disparity_sigma_px
 
 FIXED_POINT = 16
@@ -41,6 +42,8 @@ def match_padded(
     """
     check_pair(left, right)
     check_size(left, num_disparities, block_px)
+    if is_blank(left, right):
+        return nothing_known(left)
     # OpenCV gives no disparity for the first num_disparities columns: give it as many that do not count.
     padded = [cv2.copyMakeBorder(i, 0, 0, num_disparities, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
     raw: NDArray[np.int16] = algorithm.compute(*padded)[:, num_disparities:]

@@ -147,6 +147,19 @@ def test_images_without_texture_give_no_match_or_one_that_says_it_knows_nothing(
     assert (found.sigma_px[found.valid] >= 2).all()
 
 
+@pytest.mark.parametrize("covered", ["left", "right"])
+def test_with_one_lens_covered_nothing_is_known(chosen, covered):
+    left, right = shifted_pair(6.0)
+    (left if covered == "left" else right)[:] = 90
+    assert not chosen.match(left, right).valid.any()
+
+
+@pytest.mark.parametrize("count", ["x", None, [64]])
+def test_a_search_range_that_is_no_number_is_refused_in_a_line(name, count):
+    with pytest.raises(InvalidInputError, match=r"num_disparities|matcher"):
+        matcher(name, num_disparities=count)
+
+
 def test_unlike_images_match_in_few_places_only(chosen):
     rng = np.random.default_rng(3)
     left, right = rng.integers(0, 256, (2, *SHAPE), dtype=np.uint8)

@@ -16,6 +16,7 @@ from stereogrid.camera import StereoCamera
 from stereogrid.config import MappingConfig, load_config
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
+from stereogrid.matching import MATCHERS
 from stereogrid.observation import Observation, Odometry, Truth
 from stereogrid.recording.mcap import McapWriter
 
@@ -180,6 +181,12 @@ def test_the_default_config_can_be_written_and_used(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.run(cli.app, ["config", "my.toml"]) == 0
     assert load_config(MappingConfig, "my.toml") == MappingConfig()
+
+
+def test_the_help_of_map_names_every_matcher(capsys):
+    cli.run(cli.app, ["map", "--help"])
+    shown = capsys.readouterr().out
+    assert all(re.search(rf"\b{name}\b", shown) for name in MATCHERS)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["map", "--help"], ["score", "--help"], ["info", "--help"]])

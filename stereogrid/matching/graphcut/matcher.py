@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...errors import InvalidInputError
 from ...observation import Disparity, FloatImage, Image
 from ..census import Side, shares_around, side_of
-from ..images import check_images, check_num_disparities, grey_of, toned_as
+from ..images import check_images, check_num_disparities, grey_of, is_blank, nothing_known, toned_as
 from ..meter import Meter, check_time_budget
 from ..sigma import disparity_sigma_px
 from .aggregation import SCALE, line_means, weight_tables
@@ -79,6 +79,8 @@ class GraphCutMatcher:
     def match(self, left: Image, right: Image) -> Disparity:
         """Disparity of each pixel of the left image, (H, W) or (H, W, 3) uint8; NaN where the right one hides it."""
         first, second = check_images(left, right, self.num_disparities)
+        if is_blank(first, second):
+            return nothing_known(first)
         # In the tones of the left image; the census and sigma do not mind which.
         sides = [side_of(first), side_of(toned_as(first, second))]
         meter = Meter(3 * self.num_disparities, self.time_budget_s, self.progress)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...observation import Disparity, Image
 from ..census import shares_around, side_of
-from ..images import check_images, check_num_disparities
+from ..images import check_images, check_num_disparities, is_blank, nothing_known
 from ..meter import check_time_budget
 from ..sigma import disparity_sigma_px
 from .cost import energy_of_pair
@@ -45,8 +45,11 @@ class KolmogorovZabihMatcher:
 
     def match(self, left: Image, right: Image) -> Disparity:
         """Disparity of each pixel of the left image, (H, W) or (H, W, 3) uint8; NaN where it is unmatched."""
+        images = check_images(left, right, self.num_disparities)
+        if is_blank(*images):
+            return nothing_known(left)
         label, _ = self.labels(left, right)
-        sides = [side_of(image) for image in check_images(left, right, self.num_disparities)]
+        sides = [side_of(image) for image in images]
         grey_left, grey_right = (side.grey for side in sides)
         if self.subpixel:
             disparity_px = between_labels(label, grey_left, grey_right)
