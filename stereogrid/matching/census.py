@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..geometry import Array
 from ..observation import Image
-from .images import grey_of
+from .images import WINDOW_COLUMNS, WINDOW_ROWS, grey_of
 
 Mask = NDArray[np.bool_]
 
-CENSUS_COLUMNS, CENSUS_ROWS = 9, 7
+CENSUS_COLUMNS, CENSUS_ROWS = WINDOW_COLUMNS, WINDOW_ROWS
 """The census window [px]: 62 comparisons, which fit into one uint64."""
 LIKE_BITS = 16
 """Of the 62 bits so many may differ between pixels that are alike."""
