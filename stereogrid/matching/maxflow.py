@@ -1,4 +1,4 @@
-"""Maximum flow on an implicit grid, along the shortest paths of a search tree that is mended, not built anew.
+"""Maximum flow on an implicit grid, along the shortest paths of a search tree that is mended after each.
 
 Boykov and Kolmogorov's augmenting paths on a kept search tree (PAMI 2004), in the form of Goldberg, Hed, Kaplan, Tarjan
 and Werneck, "Maximum flows by incremental breadth-first search" (ESA 2011): nodes know their level, so that an orphan
@@ -15,7 +15,6 @@ from ..geometry import Array
 
 FREE, ROOT, ORPHAN = -1, 8, 9
 """Of `parent`, beside the number of the arc to the parent: in no tree, hanging on the sink, cut off."""
-
 LATER, LOWEST, STEPS = 0, 1, 2
 """Of `state`: how many nodes are in later; the lowest level that has an orphan; nodes grown or adopted so far."""
 
@@ -24,8 +23,8 @@ class Graph(NamedTuple):
     """Residual capacities of N nodes on a grid, padded so that no arc leads out of the arrays.
 
     terminal (N,) int32: from the source where > 0, to the sink where < 0. capacity (N, A) int32, A = 4 or 6: of the
-    arcs to node + offset[0..3], to node ^ 1, and to across[node] (int32; itself: no such arc). offset (4,) int64 is
-    a, -a, b, -b. across must be its own inverse.
+    arcs to node + offset[0..3], to node ^ 1, and to across[node] (int32; itself: no such arc; A = 4: not read).
+    offset (4,) int64 is a, -a, b, -b. across must be its own inverse.
     """
 
     terminal: Array

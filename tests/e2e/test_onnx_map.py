@@ -32,10 +32,9 @@ def drive(tmp_path):
 
 
 @pytest.fixture
-def network(tmp_path, monkeypatch):
+def network(tmp_path):
     pytest.importorskip("onnxruntime")
     pytest.importorskip("onnx")
-    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "unit" / "matching")
     from tiny_networks import write_network
 
     write_network(tmp_path / "net.onnx")

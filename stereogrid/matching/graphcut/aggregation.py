@@ -12,6 +12,8 @@ from ...geometry import Array
 
 SCALE = 8
 """Means are kept in eighths of the unit of the cost, so that rounding does not show between pixels."""
+SMALLEST = 0.02
+"""A weight below it ends the window on that side: what lies beyond an edge of the image need not be visited."""
 
 
 @njit(cache=True, nogil=True)
@@ -95,6 +97,3 @@ def weight_tables(reach_px: int, intensity_scale: float, distance_scale_px: floa
     by_change[by_change < SMALLEST] = 0
     by_distance = np.exp(-np.arange(reach_px + 1) / distance_scale_px)
     return by_change.astype(np.float32), by_distance.astype(np.float32)
-
-
-SMALLEST = 0.02

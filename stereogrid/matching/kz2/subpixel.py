@@ -7,6 +7,7 @@ from ...observation import FloatImage, Image
 from .solve import LabelImage
 
 WINDOW_PX = 7
+"""Side of the windows that are compared: wide enough for the noise, narrow enough for a slant."""
 
 
 def between_labels(label: LabelImage, left: Image, right: Image) -> FloatImage:

@@ -8,7 +8,7 @@ from test_graphcut import GOLDEN, PAIRS, measure
 
 stereo = Path(sys.argv[1]) / "stereo"
 golden = {
-    "command": "PYTHONPATH=. python tests/unit/matching/measure_golden_graphcut.py ../shared/data",
+    "command": "PYTHONPATH=.:tests/helpers python tests/unit/matching/measure_golden_graphcut.py ../shared/data",
     "pairs": {pair: measure(stereo / pair) for pair in PAIRS},
 }
 GOLDEN.write_text(json.dumps(golden, indent=2) + "\n", encoding="utf-8")

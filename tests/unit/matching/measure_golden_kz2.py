@@ -8,7 +8,7 @@ from test_kz2 import BEST_OF_REFERENCE, GOLDEN, measure
 
 stereo = Path(sys.argv[1]) / "stereo"
 golden = {
-    "command": "PYTHONPATH=. python tests/unit/matching/measure_golden_kz2.py ../shared/data",
+    "command": "PYTHONPATH=.:tests/helpers python tests/unit/matching/measure_golden_kz2.py ../shared/data",
     "pairs": {pair: measure(stereo / pair) for pair in BEST_OF_REFERENCE},
 }
 GOLDEN.write_text(json.dumps(golden, indent=2) + "\n", encoding="utf-8")

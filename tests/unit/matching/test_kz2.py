@@ -10,6 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from drawn_pairs import SHAPE, shifted_pair, two_layers
 
 from experiments.pairs import open_pair
 from stereogrid.errors import InvalidInputError
@@ -18,34 +19,6 @@ from stereogrid.matching.kz2.subpixel import between_labels
 from stereogrid.scoring.disparity import disparity_scores, occlusion_f1
 
 GOLDEN = Path(__file__).parent / "golden_kz2.json"
-SHAPE = (60, 140)
-SUPERSAMPLED = 8
-
-
-def texture(seed, shape=SHAPE):
-    """A random texture (H, 8 (W + 64)), drawn 8 times finer than the pixels along the rows."""
-    rng = np.random.default_rng(seed)
-    fine = rng.normal(size=(shape[0], (shape[1] + 64) * SUPERSAMPLED)).astype(np.float32)
-    fine = cv2.GaussianBlur(fine, (0, 0), 10, sigmaY=1.2)
-    return np.clip(np.rint(128 + 45 * fine / fine.std()), 0, 255).astype(np.uint8)
-
-
-def shifted_pair(disparity_px, seed=0, shape=SHAPE):
-    """A pair of a wall of one disparity, a multiple of 1/8 px."""
-    fine = texture(seed, shape)
-    begin = round(disparity_px * SUPERSAMPLED)
-    return tuple(np.ascontiguousarray(fine[:, k::SUPERSAMPLED][:, : shape[1]]) for k in (0, begin))
-
-
-def two_layers():
-    """(left, right, truth, hidden): a near square of disparity 14 before a wall of disparity 4."""
-    (left, right), near = shifted_pair(4.0, 1), shifted_pair(14.0, 2)
-    truth, hidden = np.full(SHAPE, 4.0), np.zeros(SHAPE, bool)
-    truth[15:45, 60:100] = 14
-    left[15:45, 60:100], right[15:45, 46:86] = near[0][15:45, 60:100], near[1][15:45, 46:86]
-    hidden[:, :4] = True
-    hidden[15:45, 50:60] = True
-    return left, right, truth, hidden
 
 
 def noise(seed, shape=(80, 160)):

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,11 +17,10 @@ TWO = '[{name = "left", image = "left"}, {name = "right", image = "right"}]'
 
 
 @pytest.fixture
-def tiny(monkeypatch):
+def tiny():
     """write_network, where onnx and onnxruntime are installed."""
     pytest.importorskip("onnxruntime")
     pytest.importorskip("onnx")
-    monkeypatch.syspath_prepend(Path(__file__).parent)
     from tiny_networks import write_network
 
     return write_network

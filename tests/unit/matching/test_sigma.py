@@ -23,6 +23,7 @@ from stereogrid.matching.sigma import (
     sigma_tables,
 )
 from stereogrid.matching.sigma_cues import CUES, cues, look_up
+from stereogrid.scoring.disparity import sigma_coverage
 
 SHAPE = (60, 100)
 
@@ -167,19 +168,30 @@ def test_a_table_that_is_not_whole_is_refused_naming_the_cue(changed, message):
         SigmaTable({cue: parts for cue, parts in held.items() if parts is not None})
 
 
-@pytest.mark.parametrize("name", ["venus", "teddy", "motorcycle"])
-@pytest.mark.parametrize("kind", ["bm", "sgbm", "gc"])
-def test_errors_on_real_pairs_are_covered(real_data, name, kind):
-    """Not within the 3 points that are aimed at: docs/results.md says by how much, and how held-out scenes fare."""
+COVERED = {
+    ("bm", "venus"): (0.686, 0.940),
+    ("sgbm", "venus"): (0.672, 0.941),
+    ("gc", "venus"): (0.681, 0.897),
+    ("bm", "teddy"): (0.687, 0.915),
+    ("sgbm", "teddy"): (0.680, 0.926),
+    ("gc", "teddy"): (0.644, 0.904),
+    ("bm", "motorcycle"): (0.665, 0.917),
+    ("sgbm", "motorcycle"): (0.707, 0.921),
+    ("gc", "motorcycle"): (0.674, 0.913),
+}
+"""Shares of the errors within one and two sigmas, measured by this very test with the tables that are committed.
+.68 and .95 are aimed at; docs/results.md says how far scenes stray that the tables were not fitted to."""
+
+
+@pytest.mark.parametrize(("kind", "name"), COVERED)
+def test_as_many_errors_on_real_pairs_are_within_sigma_as_were(real_data, kind, name):
     from experiments.pairs import open_pair
 
     pair = open_pair(real_data(f"stereo/{name}"))
     found = matcher(kind, num_disparities=64).match(*pair.grey)
-    judged = pair.visible & found.valid
-    error_px = np.abs(found.disparity_px - pair.truth_px)[judged]
-    wide_px = np.hypot(found.sigma_px[judged], pair.step_px / np.sqrt(12))
-    assert 100 * np.mean(error_px <= wide_px) == pytest.approx(68, abs=4)
-    assert 100 * np.mean(error_px <= 2 * wide_px) == pytest.approx(95, abs=5.5)
+    shares = sigma_coverage(found, pair.truth_px, pair.visible, step_px=pair.step_px)
+    # Other OpenCV versions round differently.
+    assert [share.value for share in shares] == pytest.approx(COVERED[kind, name], abs=0.015)
 
 
 def test_the_cue_that_look_up_lets_grow_without_end_is_the_shift():
