@@ -6,6 +6,7 @@ from pathlib import Path
 
 from stereogrid.matching.kz2 import KolmogorovZabihMatcher
 
+from .matched_pairs import at_most
 from .pairs import Pair, open_pairs
 from .parallel import Stage
 
@@ -17,6 +18,10 @@ REFERENCE: dict[str, tuple[int, float]] = {
 }
 """By pair: the least energy of the reference (pmonasse/disparity-with-graph-cuts @ 6c6f9e3) over its seeds, and its
 shortest time [CPU s], which was measured on another day than ours: compare the times only roughly."""
+
+
+MOST_PIXELS = 400_000
+"""Larger pairs are shrunk, as `experiments matchers` does: a full Aloe takes minutes."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,8 @@ class EnergyResult:
 
 def compare(folder: Path, stage: Stage) -> list[EnergyResult]:
     """Label each pair in a folder, the smallest first: it is done twice, since the first time compiles the kernels."""
-    pairs = sorted(open_pairs(folder), key=lambda pair: pair.truth_px.size * pair.num_disparities)
+    small = (at_most(pair, MOST_PIXELS) for pair in open_pairs(folder))
+    pairs = sorted(small, key=lambda pair: pair.truth_px.size * pair.num_disparities)
     with stage("labelling", len(pairs) + 1) as step:
         measure(pairs[0])
         step()
