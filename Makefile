@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test bench lint types layers format wheel-check clean
+.PHONY: demo test bench bench-grid lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -13,9 +13,15 @@ test: .venv/ready
 	$(PYTHON) -m pytest
 
 # Minutes on 2 cores; needs STEREOGRID_DATA, the folder of the real data.
-bench: .venv/ready
+bench: bench-grid
 	$(PYTHON) -m experiments energy --pairs $(STEREOGRID_DATA)/stereo
 	$(PYTHON) -m experiments matchers
+
+# The grid's speed and memory beside OctoMap's; needs no data.
+bench-grid: .venv/ready
+	mkdir -p runs
+	$(PYTHON) -m pytest tests/bench --benchmark-json=runs/bench.json --benchmark-columns=min,median,max,rounds -q
+	$(PYTHON) -m experiments grid-bench runs/bench.json
 
 lint: .venv/ready
 	.venv/bin/ruff check .
@@ -43,7 +49,7 @@ $(UV):
 
 .venv/ready: $(UV) pyproject.toml
 	$(UV) venv --quiet --clear --python $(PYTHON_VERSION) .venv
-	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,oracle,dev]"
+	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,oracle,bench,dev]"
 	touch $@
 
 clean:

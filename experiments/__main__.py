@@ -101,6 +101,58 @@ def sigma(
     console.print(f"{folder} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True)
 
 
+@app.command(epilog="Example: python -m experiments correlation --data ../shared/data --write")
+def correlation(
+    data: Annotated[
+        Path, typer.Option(envvar="STEREOGRID_DATA", help="shared/data, with stereo/ and sequences/euroc_static/.")
+    ],
+    matcher: Annotated[list[str] | None, typer.Option(help="Only this one; may be given again.  [all]")] = None,
+    write: Annotated[bool, typer.Option("--write", help="Put the numbers into the library.")] = False,
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Measure how far each matcher's errors go together, over the image and from one observation to the next."""
+    from .correlation import run as run_correlation
+    from .correlation_tables import correlation_tables
+    from .parallel import rich_stage
+
+    start_s = time.perf_counter()
+    command = " ".join(["python -m experiments", *sys.argv[1:]])
+    folder, found = run_correlation(data, rich_stage, runs=runs, names=matcher or (), write=write, command=command)
+    console = Console()
+    for table in correlation_tables(found):
+        console.print(_rich(table))
+    console.print(f"{folder} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True)
+
+
+@app.command(epilog="Example: python -m experiments fusion --data ../shared/data")
+def fusion(
+    config: Annotated[Path | None, typer.Option(help="A config.toml, as a run leaves one.")] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(envvar="STEREOGRID_DATA", help="shared/data, with sequences/kitti_straight and rgbd_7scenes."),
+    ] = None,
+    recording: Annotated[Path | None, typer.Option(help="Map this recorded drive again.")] = None,
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Compare what the grid may be told of how far a matcher's errors go together, and the literal sum of rays."""
+    from stereogrid.config import load_config
+
+    from .fusion import FusionConfig
+    from .fusion import run as run_fusion
+    from .parallel import rich_stage
+
+    start_s = time.perf_counter()
+    chosen = load_config(FusionConfig, config) if config else FusionConfig()
+    command = " ".join(["python -m experiments", *sys.argv[1:]])
+    folder, tables = run_fusion(chosen, rich_stage, runs=runs, data=data, recording=recording, command=command)
+    console = Console()
+    for table in tables:
+        console.print(_rich(table))
+    console.print(
+        f"{folder / 'report.html'} after {time.perf_counter() - start_s:.0f} s", highlight=False, soft_wrap=True
+    )
+
+
 @app.command(epilog="Example: python -m experiments energy --pairs ../shared/data/stereo")
 def energy(
     pairs: Annotated[Path, typer.Option(help="Folder of pairs with known disparity, one folder each.")],
@@ -116,6 +168,23 @@ def energy(
         times = (f"{result.cpu_s:.1f}", f"{result.wall_s:.1f}")
         table.add_row(result.pair, str(result.energy), relation[0], *times, relation[1])
     Console().print(table)
+
+
+@app.command(epilog="Example: make bench-grid, which measures first")
+def grid_bench(
+    bench: Annotated[Path, typer.Argument(help="What pytest tests/bench --benchmark-json=FILE wrote.")],
+    picture: Annotated[Path | None, typer.Option(help="Write the figure there as well.")] = None,
+    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Lay out the grid's benchmark: speed and memory beside OctoMap's, as tables and a figure."""
+    from .grid_bench import run as run_bench
+
+    folder, tables = run_bench(bench, runs=runs, picture=picture)
+    console = Console()
+    for table in tables:
+        console.print(_rich(table))
+        console.print(f"{table.caption}. {table.note}\n", highlight=False)
+    console.print(f"{folder / 'tables.md'}", highlight=False, soft_wrap=True)
 
 
 @app.command(epilog="Example: python -m experiments pictures runs/latest")

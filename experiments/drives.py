@@ -9,6 +9,7 @@ import numpy as np
 from sim.record import record_drive
 from sim.world import WORLDS
 from stereogrid.errors import InvalidInputError, unknown_name
+from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Mapped
 from stereogrid.observation import Recording
 from stereogrid.scoring import Score
@@ -76,9 +77,14 @@ def record(drive: DriveConfig, path: Path, stage: Stage) -> Path:
 
 def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
     """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
-    among = obstacles.score(mapped.grid, prior=mapped.grid.model.prior, surface=False)
+    return score_grid(truth, obstacles, mapped.grid)
+
+
+def score_grid(truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid) -> list[Score]:
+    """The same of a grid."""
+    among = obstacles.score(grid, prior=grid.model.prior, surface=False)
     named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
-    return [*truth.score(mapped.grid, prior=mapped.grid.model.prior), *named]
+    return [*truth.score(grid, prior=grid.model.prior), *named]
 
 
 def about(drive: Recording) -> dict[str, str]:

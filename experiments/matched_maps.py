@@ -16,6 +16,7 @@ from stereogrid.scoring import Score
 from stereogrid.scoring.paired import Interval, paired_difference
 from stereogrid.scoring.truth import MapTruth
 
+from .compared import BOOTSTRAP_SEED
 from .contenders import Contender
 from .drives import HEADLINE, OBSTACLES_M, score
 from .matched_pairs import timed
@@ -24,8 +25,6 @@ from .parallel import Stage, counted, in_parallel, until
 DENSITY = "disparity_density"
 SHOWN = (*HEADLINE, DENSITY)
 """The scores of a map that tables show and that differences are taken of."""
-BOOTSTRAP_SEED = 0
-"""One for every difference: all are resampled alike."""
 
 
 @dataclass(frozen=True)

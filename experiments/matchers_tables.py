@@ -6,9 +6,8 @@ from dataclasses import replace
 
 from stereogrid.report import ReportTable
 from stereogrid.scoring import Score
-from stereogrid.scoring.paired import Interval
-from stereogrid.scoring.score import DIMENSIONLESS
 
+from .compared import interval_text, labelled, plain
 from .matched_maps import SHOWN, MapResult
 from .matched_pairs import PairResult
 
@@ -110,8 +109,8 @@ def map_tables(result: MapResult, reference: str) -> list[ReportTable]:
         return [means]
     rows = [
         [
-            _labelled(score, result.unit(score)),
-            *(_interval(result.difference(name, reference, score)) for name in others),
+            labelled(score, result.unit(score)),
+            *(interval_text(result.difference(name, reference, score)) for name in others),
         ]
         for score in SHOWN
     ]
@@ -126,27 +125,11 @@ def map_tables(result: MapResult, reference: str) -> list[ReportTable]:
 def mean_table(result: MapResult) -> ReportTable:
     """Mean map scores by matcher."""
     rows = [
-        [_labelled(score, result.unit(score)), *(_plain(result.mean(name, score)) for name in result.scores)]
+        [labelled(score, result.unit(score)), *(plain(result.mean(name, score)) for name in result.scores)]
         for score in SHOWN
     ]
     note = f"Means over {result.n_seeds} seeds of the image noise, the same for every matcher."
     return ReportTable("Maps", ["map score", *result.scores], rows, note=note)
-
-
-def _labelled(name: str, unit: str) -> str:
-    return name if unit == DIMENSIONLESS or name.endswith(f"_{unit}") else f"{name} [{unit}]"
-
-
-def _plain(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.3f}"
-
-
-def _interval(interval: Interval) -> str:
-    """As +0.0040 [+0.0021, +0.0062]; a dash where there is no number."""
-    mean, low, high = (
-        "-" if math.isnan(value) else f"{value:+.4f}" for value in (interval.mean, interval.low, interval.high)
-    )
-    return f"{mean} [{low}, {high}]"
 
 
 def screen_tables(on_pairs: Sequence[PairResult], by_map: MapResult) -> list[ReportTable]:

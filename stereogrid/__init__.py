@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .camera import Rectification, StereoCamera
     from .config import MappingConfig
     from .errors import StereogridError
-    from .grid import OccupancyGrid
+    from .exporting import export
+    from .grid import OccupancyGrid, State
     from .mapper import Mapper
     from .matching import matcher
     from .motion import MotionError, NoisyOdometry, OdometryNoise
@@ -43,9 +44,11 @@ __all__ = [
     "Rectification",
     "SensorModel",
     "Source",
+    "State",
     "StereoCamera",
     "StereogridError",
     "Truth",
+    "export",
     "matcher",
     "open_recording",
 ]
@@ -54,7 +57,8 @@ _HOMES = {
     "camera": ("Rectification", "StereoCamera"),
     "config": ("MappingConfig",),
     "errors": ("StereogridError",),
-    "grid": ("OccupancyGrid",),
+    "exporting": ("export",),
+    "grid": ("OccupancyGrid", "State"),
     "mapper": ("Mapper",),
     "matching": ("matcher",),
     "motion": ("MotionError", "NoisyOdometry", "OdometryNoise"),

@@ -101,13 +101,13 @@ def _overridden(config: "MappingConfig", cell: float | None, max_range: float | 
 
 @app.command(epilog="Example: stereogrid info drive.mcap")
 def info(recording: RecordingPath) -> None:
-    """Say what a recording or a map holds."""
+    """Say what a recording or a map (.sgrid, OctoMap's .bt or .ot) holds."""
     import numpy as np
 
     from .grid import OccupancyGrid
     from .recording import open_recording, poses
 
-    if recording.suffix == ".sgrid":
+    if recording.suffix in (".sgrid", ".bt", ".ot"):
         console.print(repr(OccupancyGrid.load(recording)), highlight=False, soft_wrap=True)
         return
     source = open_recording(recording)
@@ -126,7 +126,7 @@ def info(recording: RecordingPath) -> None:
 
 @app.command(epilog="Example: stereogrid score map.sgrid drive.mcap --range 5")
 def score(
-    grid: Annotated[Path, typer.Argument(help="A map file (.sgrid).")],
+    grid: Annotated[Path, typer.Argument(help="A map file: .sgrid, or OctoMap's .bt or .ot.")],
     recording: Annotated[Path, typer.Argument(help="The recording it was made from, with its truth (an MCAP file).")],
     max_range: Annotated[float, typer.Option("--range", help="Score cells seen within this range [m].")] = 5.0,
 ) -> None:
@@ -143,6 +143,26 @@ def score(
         )
         scores = truth.score(loaded, prior=loaded.model.prior)
     _print_scores(scores)
+
+
+@app.command("export", epilog="Example: stereogrid export map.sgrid map.bt")
+def export_command(
+    grid: Annotated[Path, typer.Argument(help="A map file: .sgrid, or OctoMap's .bt or .ot.")],
+    out: Annotated[Path, typer.Argument(help="Where to write; .bt, .glb, .ot, .pcd, .pgm, .ply or .yaml.")],
+    threshold: Annotated[float | None, typer.Option(help="Draw cells with p above it (.glb, .pcd, .ply); .5.")] = None,
+    cubes: Annotated[bool, typer.Option("--cubes", help="A mesh of cubes instead of points (.ply).")] = False,
+    ascii: Annotated[bool, typer.Option("--ascii", help="Text instead of binary (.pcd).")] = False,
+    low: Annotated[float | None, typer.Option(help="Lowest height that counts [m] (.pgm, .yaml); .1.")] = None,
+    high: Annotated[float | None, typer.Option(help="Highest height that counts [m] (.pgm, .yaml); 1.5.")] = None,
+) -> None:
+    """Write a map in the format of another program, which the suffix of the file chooses."""
+    from .exporting import check_export, export
+    from .grid import OccupancyGrid
+
+    options = {"threshold": threshold, "cubes": cubes or None, "ascii": ascii or None, "low_m": low, "high_m": high}
+    given = {name: value for name, value in options.items() if value is not None}
+    check_export(out, **given)
+    export(OccupancyGrid.load(grid), out, **given)
 
 
 @app.command("config", epilog="Example: stereogrid config my.toml")

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 
 from .camera import StereoCamera
 from .errors import InvalidInputError
-from .grid import OccupancyGrid
+from .grid import DEFAULT_CLAMP, OccupancyGrid
 from .mapper import Mapper
 from .matching import matcher
+from .matching.correlation import error_reach
 from .motion import MotionError
 from .observation import Matcher
 from .sensor_model import SensorModel
@@ -38,11 +39,11 @@ class MatcherConfig:
 
 @dataclass(frozen=True)
 class GridConfig:
-    """[grid]: cell size [m], fusion rule, largest absolute log-odds (0 = no limit), memory limit [GB]."""
+    """[grid]: cell size [m], fusion rule, lowest and highest log-odds ([] = no limit), memory limit [GB]."""
 
     cell_m: float = 0.05
     fusion: str = "cell"
-    clamp: float = 4.0
+    clamp: tuple[float, ...] = DEFAULT_CLAMP
     memory_limit_gb: float = 4.0
 
 
@@ -80,7 +81,7 @@ class MappingConfig:
             clamp=self.grid.clamp or None,
             memory_limit_gb=self.grid.memory_limit_gb,
         )
-        return Mapper(camera, self.matcher.build(), grid, self.motion_error)
+        return Mapper(camera, self.matcher.build(), grid, self.motion_error, reach=error_reach(self.matcher.name))
 
 
 __all__ = ["GridConfig", "MappingConfig", "MatcherConfig", "config_from_table", "load_config", "save_config"]

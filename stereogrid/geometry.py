@@ -32,7 +32,7 @@ def as_pose(T: ArrayLike, name: str = "pose") -> FloatArray:
         raise InvalidInputError(f"{name} must be a (4, 4) matrix, not {pose.shape}")
     if not np.isfinite(pose).all():
         raise InvalidInputError(f"{name} contains NaN or infinity")
-    if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-9):
+    if max(abs(pose[3, 0]), abs(pose[3, 1]), abs(pose[3, 2]), abs(pose[3, 3] - 1)) > 1e-9:
         raise InvalidInputError(f"{name} must end with the row 0 0 0 1, not {pose[3].tolist()}")
     R = pose[:3, :3]
     deviation = float(np.abs(R @ R.T - np.eye(3)).max())

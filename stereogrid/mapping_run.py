@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .config import MappingConfig, save_config
-from .errors import InvalidInputError, RecordingError
+from .errors import InvalidInputError, MapTooLargeError, RecordingError
 from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
 from .files import check_writable
 from .geometry import FloatArray
@@ -35,13 +35,15 @@ class Mapped:
     """A map and what is remembered of its making.
 
     path_T_world_cam (M, 4, 4): where the camera was taken to be; sample: an observation a quarter of
-    the way down the drive with its disparity, for figures; density: mean share of matched pixels.
+    the way down the drive with its disparity, for figures; density: mean share of matched pixels;
+    stopped: what the map could not grow beyond, after the M observations that it holds.
     """
 
     grid: OccupancyGrid
     path_T_world_cam: FloatArray
     sample: tuple[Observation, Disparity]
     density: float
+    stopped: MapTooLargeError | None = None
 
     @property
     def path_m(self) -> FloatArray:
@@ -72,23 +74,51 @@ def build_map(
 ) -> Mapped:
     """Map a recording, by disparity_of where it is given instead of by the config's matcher.
 
-    Raises RecordingError when there is no observation.
+    Raises RecordingError when there is no observation, MapTooLargeError when the map outgrows its memory limit.
+    """
+    mapped = map_while_it_fits(recording, config, track, disparity_of=disparity_of)
+    if mapped.stopped:
+        raise mapped.stopped
+    return mapped
+
+
+def map_while_it_fits(
+    recording: Recording,
+    config: MappingConfig,
+    track: Track = untracked,
+    *,
+    disparity_of: Callable[[Observation], Disparity] | None = None,
+) -> Mapped:
+    """As build_map, but a map that outgrows its memory limit is returned as far as it goes: `stopped` says so.
+
+    Raises MapTooLargeError when not even the first observation fits.
     """
     mapper = config.build_mapper(recording.camera)
-    poses, densities, sample = [], [], None
-    for n, observation in enumerate(track(recording, "mapping", len(recording))):
+
+    def step(observation: Observation) -> Disparity:
         if disparity_of is None:
-            disparity = mapper.step(observation)
-        else:
-            disparity = disparity_of(observation)
-            mapper.fuse(observation, disparity)
+            return mapper.step(observation)
+        disparity = disparity_of(observation)
+        mapper.fuse(observation, disparity)
+        return disparity
+
+    poses, densities, sample, stopped = [], [], None, None
+    for n, observation in enumerate(track(recording, "mapping", len(recording))):
+        try:
+            disparity = step(observation)
+        except MapTooLargeError as error:
+            if sample is None:
+                raise
+            stopped = error
+            break
         poses.append(observation.T_world_cam)
         densities.append(disparity.density)
-        if n == len(recording) // 4:
+        # The latest one until then: a drive may end before its first quarter.
+        if n <= len(recording) // 4:
             sample = (observation, disparity)
     if sample is None:
         raise RecordingError("the recording holds no complete observation, so there is nothing to map")
-    return Mapped(mapper.grid, np.array(poses), sample, float(np.mean(densities)))
+    return Mapped(mapper.grid, np.array(poses), sample, float(np.mean(densities)), stopped)
 
 
 def map_recording(
@@ -101,31 +131,49 @@ def map_recording(
     command: str = "",
     track: Track = untracked,
 ) -> MappingResult:
-    """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid)."""
+    """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid).
+
+    Where the map outgrows its memory limit, all is written of the map so far, and then MapTooLargeError raised.
+    """
     if out is not None:
         check_writable(out)
     config.build_mapper(recording.camera)  # refuses what cannot work before anything is written
     with run_folder(runs, name) as folder:
-        mapped = build_map(recording, config, track)
-        scores = [
-            camera_height(mapped.grid, mapped.path_m),
-            Score("disparity_density", mapped.density, "1", len(mapped.path_m)),
-            Score("known_cells", mapped.grid.n_known, "cell", mapped.grid.n_known),
-        ]
+        mapped = map_while_it_fits(recording, config, track)
+        scores = _scores(mapped)
+        facts = {"command": command} | _stop(mapped, recording)
         save_config(config, folder / "config.toml")
         mapped.grid.save(folder / "map.sgrid")
-        write_metrics(folder, {"command": command, "scores": scores_to_dict(scores)})
+        write_metrics(folder, {**facts, "scores": scores_to_dict(scores)})
         write_report(
             folder,
             f"Map of {name}",
             summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
             arms={"map": scores},
             figures=draw_map(mapped, recording, folder, track),
-            facts={"command": command, "map sha256": mapped.grid.sha256()},
+            facts={**facts, "map sha256": mapped.grid.sha256()},
         )
         if out is not None:
             mapped.grid.save(out)
+    if mapped.stopped:
+        places = " and ".join(str(place) for place in (finished_path(folder), out) if place)
+        raise MapTooLargeError(f"{_stop(mapped, recording)['stopped']}; the map so far is saved in {places}")
     return MappingResult(finished_path(folder), mapped.grid, scores)
+
+
+def _scores(mapped: Mapped) -> list[Score]:
+    return [
+        camera_height(mapped.grid, mapped.path_m),
+        Score("disparity_density", mapped.density, "1", len(mapped.path_m)),
+        Score("known_cells", mapped.grid.n_known, "cell", mapped.grid.n_known),
+    ]
+
+
+def _stop(mapped: Mapped, recording: Recording) -> dict[str, str]:
+    """Why and where the mapping stopped; nothing of a whole map."""
+    if mapped.stopped is None:
+        return {}
+    return {"stopped": f"{mapped.stopped}: stopped after {len(mapped.path_m)} of {len(recording)} observations"}
 
 
 def draw_map(

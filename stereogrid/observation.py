@@ -1,5 +1,6 @@
 """What flows through the house: readings, disparities, and the protocols of those who make them."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -79,12 +80,19 @@ def check_pair(left: NDArray[Any], right: NDArray[Any]) -> None:
 
 @dataclass(frozen=True)
 class Disparity:
-    """disparity_px = x_left - x_right > 0 and its standard deviation sigma_px, (H, W) float32, NaN = no match."""
+    """disparity_px = x_left - x_right > 0 and its standard deviation sigma_px, (H, W) float32, NaN = no match.
+
+    correlation_px: side [px] of the square of pixels whose errors go together: 1 = independent from pixel to pixel,
+    inf = all the pixels on which a cell falls err together, so that an observation gives one look at a cell.
+    """
 
     disparity_px: FloatImage
     sigma_px: FloatImage
+    correlation_px: float = math.inf
 
     def __post_init__(self) -> None:
+        if not self.correlation_px >= 1:
+            raise InvalidInputError(f"correlation_px must be 1 to inf, not {self.correlation_px}")
         d = np.ascontiguousarray(self.disparity_px, dtype=np.float32)
         sigma = np.asarray(self.sigma_px, dtype=np.float32)
         if d.ndim != 2:

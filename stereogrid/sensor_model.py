@@ -18,10 +18,15 @@ FORMS = ("corrected", "printed")
 MOTION_RULES = ("rss", "linear")
 REACH_SIGMAS = 3.5
 """Further than this before the measured surface a cell is plainly free."""
-REACH_BEHIND_SIGMAS = 1.0
+REACH_BEHIND_SIGMAS = 1.5
 """A cell that begins further than this behind it learns nothing: what little Eq. 12 still claims there is not free of
 the claims of the next observations, and adds up to walls many cells thick. (The printed form reaches as far behind as
 before.)"""
+
+
+LOOKS_EXPONENT = 0.2
+"""n independent looks at a cell in one observation narrow its reading by the root of n, and are worth n^0.2 readings
+of that width: much of what they say, they say together (0 and 1 are worse calibrated, see docs/results.md)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ class SensorModel:
     (the paper's sum, a worst-case bound).
     """
 
-    p_free: float = 0.3
+    p_free: float = 0.25
     p_occupied: float = 0.9
     prior: float = 0.5
     max_range_m: float = 8.0
@@ -113,25 +118,52 @@ def widened_sigma_px(
     return widened
 
 
+def odds(probability: float) -> float:
+    """p / (1 - p)."""
+    return probability / (1 - probability)
+
+
+def likelihood_ratios(model: SensorModel) -> tuple[float, float]:
+    """How much likelier an occupied cell makes a reading whose surface is certainly in it (A), or behind it (F)."""
+    return odds(model.p_occupied) / odds(model.prior), odds(model.p_free) / odds(model.prior)
+
+
+def likelihood_ratio(
+    range_m: ArrayLike, measured_range_m: ArrayLike, sigma_m: ArrayLike, *, cell_m: float, model: SensorModel
+) -> FloatArray:
+    """P(reading | cell occupied) / P(reading | free) of a cell of cell_m centred at range_m on the reading's ray.
+
+    With u = (l - l_p) / dl and h = cell / (2 dl), the surface lies
+      in the cell      with probability Phi(u + h) - Phi(u - h)   (Eq. 11: never above 1),
+      behind the cell  with 1 - Phi(u + h)                        (the ray has passed through it),
+      before the cell  with Phi(u - h)                            (the reading says nothing of it),
+    and the ratio is the mean of A, F and 1 with these weights (Eq. 12). Arguments broadcast; from F to A.
+    """
+    hit, passed = likelihood_ratios(model)
+    sigma = as_floats(sigma_m)
+    u = (as_floats(range_m) - as_floats(measured_range_m)) / sigma
+    half = 0.5 * cell_m / sigma
+    ratio: FloatArray = passed + (hit - passed) * ndtr(u + half) - (hit - 1) * ndtr(u - half)
+    return ratio
+
+
 def occupancy_probability(
     range_m: ArrayLike, measured_range_m: ArrayLike, sigma_m: ArrayLike, *, cell_m: float, model: SensorModel
 ) -> FloatArray:
     """p(occupied) of a cell of cell_m whose centre lies at range_m on the ray of one reading. Eqs. 11 and 12.
 
-    With u = (l - l_p) / dl and h = cell / (2 dl):
-      hit = Phi(u + h) - Phi(u - h)      the probability that the surface lies in the cell, never above 1
-      w = exp(-max(|u| - h, 0)^2 / 2)    Eq. 12's weight, taken at the point of the cell nearest to l_p
-      p = (1 - w) p_side + w (p0 + (p_occupied - p0) hit),   p_side = p_free in front, p0 behind.
-    Arguments broadcast; in (0, 1) for every range, sigma and cell size.
+    The posterior of the prior under likelihood_ratio: from p_free far in front of the surface over at most p_occupied
+    to the prior far behind it. Arguments broadcast; in (0, 1) for every range, sigma and cell size.
     """
-    sigma = as_floats(sigma_m)
-    u = (as_floats(range_m) - as_floats(measured_range_m)) / sigma
-    half = 0.5 * cell_m / sigma
-    hit = ndtr(u + half) - ndtr(u - half)
-    weight = np.exp(-0.5 * np.square(np.maximum(np.abs(u) - half, 0.0)))
-    side = np.where(u < 0, model.p_free, model.prior)
-    p: FloatArray = (1 - weight) * side + weight * (model.prior + (model.p_occupied - model.prior) * hit)
+    ratio = likelihood_ratio(range_m, measured_range_m, sigma_m, cell_m=cell_m, model=model)
+    posterior = ratio * odds(model.prior)
+    p: FloatArray = posterior / (1 + posterior)
     return p
+
+
+def reach_behind(model: SensorModel) -> float:
+    """A cell that begins further behind the surface than this [sigmas] learns nothing."""
+    return REACH_SIGMAS if model.form == "printed" else REACH_BEHIND_SIGMAS
 
 
 KernelModel = tuple[float, float, float, bool, float, float]
@@ -142,6 +174,4 @@ def kernel_parameters(model: SensorModel) -> KernelModel:
 
     Arguments, not constants of the kernels: Numba's cache does not notice when another module's constant changes.
     """
-    printed = model.form == "printed"
-    behind = REACH_SIGMAS if printed else REACH_BEHIND_SIGMAS
-    return model.p_free, model.p_occupied, model.prior, printed, REACH_SIGMAS, behind
+    return model.p_free, model.p_occupied, model.prior, model.form == "printed", REACH_SIGMAS, reach_behind(model)

@@ -1,4 +1,4 @@
-"""Build the wheel, install it alone in a clean environment, and map a recording from another folder with it.
+"""Build the wheel, install it alone in a clean environment, and map a recording and export it from another folder.
 
 `python tests/wheel_check.py UV`: UV is the uv to build and install with. It proves the rule that stereogrid needs
 neither pybullet nor sim/ nor experiments/: the recording is made here, the map there.
@@ -36,6 +36,8 @@ def main(uv: str) -> None:
             if call(python, "-c", f"import {absent}", cwd=folder, may_fail=True) == 0:
                 sys.exit(f"the wheel's environment must not hold {absent}")
         call(folder / "env" / "bin" / "stereogrid", "map", "wall.mcap", "--out", "wall.sgrid", cwd=folder)
+        call(folder / "env" / "bin" / "stereogrid", "export", "wall.sgrid", "wall.bt", cwd=folder)
+        call(folder / "env" / "bin" / "stereogrid", "info", "wall.bt", cwd=folder)
         metrics = json.loads((folder / "runs" / "latest" / "metrics.json").read_text())
         known = metrics["scores"]["known_cells"]["value"]
         if known < 1000 or not (folder / "wall.sgrid").exists():

@@ -1,104 +1,144 @@
-"""Sparse storage: a growing pool of cubic blocks, found by their index."""
-
-import math
-from collections.abc import Iterator
+"""Sparse storage: a growing pool of cubic blocks of cells, found by their index."""
 
 import numpy as np
 
 from ..geometry import Array
-from .kernels import BLOCK
+from .cells import LogOddsCells
+from .hashing import FREE_SLOT, add_rows, fill_slots, find_rows
 
-BYTES_PER_CELL = 6
-"""float32 log-odds and a uint16 update count."""
-SHAPE = (BLOCK, BLOCK, BLOCK)
+BLOCK = 8
+"""Cells along the edge of a block."""
+CELLS = BLOCK**3
 
 
 class BlockStore:
-    """Blocks of 16^3 cells: log_odds (capacity, 16, 16, 16) float32 and n_updates, uint16, rows by block index."""
+    """Blocks of 8^3 cells, row by row: words (capacity, 512) of a cell rule, C order within a block."""
 
-    def __init__(self, initial_log_odds: float) -> None:
-        self._initial = np.float32(initial_log_odds)
-        self._row_of: dict[tuple[int, int, int], int] = {}
-        self.log_odds: Array = np.empty((0, *SHAPE), dtype=np.float32)
-        self.n_updates: Array = np.empty((0, *SHAPE), dtype=np.uint16)
+    def __init__(self, rule: LogOddsCells) -> None:
+        self.rule = rule
+        self.words: Array = np.zeros((0, CELLS), dtype=rule.dtype)
+        self._indices = np.zeros((0, 3), dtype=np.int64)
+        self._slots = np.full(64, FREE_SLOT, dtype=np.int32)
+        self._count = 0
 
     def __len__(self) -> int:
-        return len(self._row_of)
+        return self._count
 
     @property
     def n_bytes(self) -> int:
-        """Memory of the blocks in use [bytes]."""
-        return len(self) * BLOCK**3 * BYTES_PER_CELL
+        """Memory of the blocks in use [bytes]: their cells, their indices and their share of the hash."""
+        return self.bytes_of(len(self))
+
+    def bytes_of(self, n_blocks: int) -> int:
+        """Memory that n_blocks take [bytes]."""
+        slots = 2 * self._slots.itemsize
+        return n_blocks * (CELLS * self.words.itemsize + 3 * self._indices.itemsize + slots)
 
     def bytes_with(self, blocks: Array) -> int:
-        """Memory that the store would use with blocks (B, 3) added [bytes]."""
-        new = sum(tuple(block) not in self._row_of for block in blocks.tolist())
-        return (len(self) + new) * BLOCK**3 * BYTES_PER_CELL
+        """Memory that the store would use with blocks (B, 3), all different, added [bytes]."""
+        return self.bytes_of(len(self) + int(np.count_nonzero(self.find(blocks) < 0)))
+
+    def find(self, blocks: Array) -> Array:
+        """The rows (B,) int64 of blocks (B, 3), -1 where a block is not held."""
+        rows = np.empty(len(blocks), dtype=np.int64)
+        find_rows(np.ascontiguousarray(blocks, dtype=np.int64), self._slots, self._indices, rows)
+        return rows
+
+    def table(self) -> tuple[Array, Array, Array]:
+        """Hash slots, block indices and words, as kernels take them to look cells up (hashing.row_of)."""
+        return self._slots, self._indices, self.words
+
+    def span(self) -> tuple[Array, Array]:
+        """Least cell (3,) and the one past the largest of the blocks held; both 0 where none is."""
+        held = self._indices[: len(self)]
+        if not len(held):
+            return np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
+        return held.min(axis=0) * BLOCK, (held.max(axis=0) + 1) * BLOCK
 
     def rows(self, blocks: Array) -> Array:
         """The rows (B,) int64 of blocks (B, 3); blocks not held yet are added, unknown."""
-        rows = [self._row_of.setdefault(tuple(block), len(self._row_of)) for block in blocks.tolist()]
-        if len(self._row_of) > len(self.log_odds):
-            self._grow(max(len(self._row_of), 3 * len(self.log_odds) // 2))
-        return np.array(rows, dtype=np.int64)
+        self._reserve(len(self) + len(blocks))
+        rows = np.empty(len(blocks), dtype=np.int64)
+        blocks = np.ascontiguousarray(blocks, dtype=np.int64)
+        self._count = int(add_rows(blocks, self._slots, self._indices, self._count, rows))
+        return rows
 
-    def _grow(self, capacity: int) -> None:
-        added = capacity - len(self.log_odds)
-        self.log_odds = np.concatenate([self.log_odds, np.full((added, *SHAPE), self._initial, dtype=np.float32)])
-        self.n_updates = np.concatenate([self.n_updates, np.zeros((added, *SHAPE), dtype=np.uint16)])
+    def _reserve(self, needed: int) -> None:
+        if needed <= len(self.words):
+            return
+        capacity = max(needed, 3 * len(self.words) // 2)
+        # Zeros that nobody has touched take no memory yet: room to grow costs nothing.
+        words = np.zeros((capacity, CELLS), dtype=self.rule.dtype)
+        indices = np.zeros((capacity, 3), dtype=np.int64)
+        words[: len(self)], indices[: len(self)] = self.words[: len(self)], self._indices[: len(self)]
+        self.words, self._indices = words, indices
+        if 2 * capacity > len(self._slots):
+            self._slots = np.full(1 << (2 * capacity - 1).bit_length(), FREE_SLOT, dtype=np.int32)
+            fill_slots(self._slots, self._indices, self._count)
 
     def indices(self) -> Array:
         """Indices (B, 3) int64 of the blocks held, row by row."""
-        return np.array(list(self._row_of), dtype=np.int64).reshape(-1, 3)
+        return self._indices[: len(self)].copy()
+
+    def in_order(self) -> Array:
+        """The rows (B,) int64 of the blocks held, in lexical order of their indices: no trace of the map's history."""
+        order: Array = np.lexsort(self._indices[: len(self)].T[::-1])
+        return order
+
+    def log_odds(self) -> Array:
+        """float32 (B, 8, 8, 8) log-odds of the blocks held, row by row."""
+        return self.rule.log_odds(self.words[: len(self)]).reshape(-1, BLOCK, BLOCK, BLOCK)
 
     def counts(self) -> Array:
-        """Update counts (B, 16, 16, 16) of the blocks held, row by row."""
-        counts: Array = self.n_updates[: len(self)]
-        return counts
+        """uint16 (B, 8, 8, 8) update counts of the blocks held, row by row."""
+        return self.rule.n_updates(self.words[: len(self)]).reshape(-1, BLOCK, BLOCK, BLOCK)
 
     def at(self, cells: Array) -> tuple[Array, Array]:
-        """Log-odds and update counts (N,) of cells (N, 3) int64; count 0 where no block is held."""
-        row = self._rows_or_none(cells // BLOCK)
-        held = row >= 0
-        values = np.full(len(cells), self._initial, dtype=np.float32)
-        counts = np.zeros(len(cells), dtype=np.uint16)
-        place = (row[held], *(cells[held] % BLOCK).T)
-        values[held], counts[held] = self.log_odds[place], self.n_updates[place]
-        return values, counts
+        """Log-odds (N,) float32 and update counts (N,) uint16 of cells (N, 3) int64; count 0 where none is held."""
+        words = self.words_at(cells)
+        return self.rule.log_odds(words), self.rule.n_updates(words)
 
-    def _rows_or_none(self, blocks: Array) -> Array:
-        """The rows (N,) int64 of blocks (N, 3) with many repeats, -1 where a block is not held."""
-        indices = self.indices()
-        if not len(indices):
-            return np.full(len(blocks), -1, dtype=np.int64)
-        low, high = indices.min(axis=0), indices.max(axis=0)
-        inside = ((blocks >= low) & (blocks <= high)).all(axis=1)
-        size = high - low + 1
-        if math.prod(size.tolist()) >= 2**63:
-            return np.array([self._row_of.get(tuple(block), -1) for block in blocks.tolist()], dtype=np.int64)
-        # One number a block: sorting numbers is many times faster than sorting rows.
-        keys = np.ravel_multi_index(tuple((indices - low).T), tuple(size))
-        order = np.argsort(keys)
-        wanted = np.ravel_multi_index(tuple((blocks[inside] - low).T), tuple(size))
-        place = np.minimum(np.searchsorted(keys[order], wanted), len(keys) - 1)
-        rows = np.full(len(blocks), -1, dtype=np.int64)
-        rows[inside] = np.where(keys[order][place] == wanted, order[place], -1)
-        return rows
+    def words_at(self, cells: Array) -> Array:
+        """The words (N,) of cells (N, 3) int64; 0 where no block is held."""
+        rows = self.find(cells // BLOCK)
+        held = rows >= 0
+        words = np.zeros(len(cells), dtype=self.rule.dtype)
+        words[held] = self.words[rows[held], _place(cells[held])]
+        return words
 
-    def in_order(self) -> Iterator[tuple[Array, Array, Array]]:
-        """Block by block in lexical order of the index: index (3,), log-odds (16, 16, 16), and which are known."""
-        indices = self.indices()
-        for row in np.lexsort(indices.T[::-1]):
-            yield indices[row], self.log_odds[row], self.n_updates[row] > 0
+    def put(self, cells: Array, words: Array) -> None:
+        """Set the words (N,) of cells (N, 3) int64, all different; blocks not held yet are added."""
+        self.rows(blocks_of(cells))
+        self.words[self.find(cells // BLOCK), _place(cells)] = words
 
     def known(self, above: float = -np.inf) -> tuple[Array, Array]:
         """Cells (N, 3) int64 that were updated and whose log-odds exceed `above`, and their log-odds (N,).
 
         Block by block in lexical order, and so within a block: the order does not depend on the map's history.
         """
-        cells, values = [np.empty((0, 3), dtype=np.int64)], [np.empty(0, dtype=np.float32)]
-        for index, log_odds, known in self.in_order():
-            kept = known & (log_odds > above)
-            cells.append(index * BLOCK + np.argwhere(kept))
-            values.append(log_odds[kept])
-        return np.concatenate(cells), np.concatenate(values)
+        order = self.in_order()
+        words = self.words[order]
+        row, place = np.nonzero((self.rule.n_updates(words) > 0) & (self.rule.log_odds(words) > above))
+        within = np.stack(np.unravel_index(place, (BLOCK, BLOCK, BLOCK)), axis=-1)
+        return self._indices[order[row]] * BLOCK + within, self.rule.log_odds(words[row, place])
+
+
+def blocks_of(cells: Array) -> Array:
+    """The blocks (B, 3) int64, all different, that hold cells (N, 3) int64."""
+    blocks = cells // BLOCK
+    # Cells mostly come block by block: few are left to sort.
+    blocks = _without_repeats(blocks)
+    return _without_repeats(blocks[np.lexsort(blocks.T[::-1])])
+
+
+def _without_repeats(rows: Array) -> Array:
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return rows[new]
+
+
+def _place(cells: Array) -> Array:
+    """Where in its block's row each of cells (N, 3) stands."""
+    i, j, k = (cells % BLOCK).T
+    place: Array = (i * BLOCK + j) * BLOCK + k
+    return place

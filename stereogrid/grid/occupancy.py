@@ -2,37 +2,37 @@
 
 import hashlib
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..camera import StereoCamera
 from ..errors import InvalidInputError, MapTooLargeError, unknown_name
-from ..geometry import Array, FloatArray, as_floats, as_pose
+from ..geometry import Array, FloatArray
 from ..observation import Disparity
-from ..sensor_model import SensorModel, kernel_parameters, log_odds, probability, widened_sigma_px
+from ..sensor_model import SensorModel, log_odds, probability
 from .blocks import BlockStore
-from .kernels import BLOCK, add_evidence, sum_rays, sweep_cells, vote_hits
-from .view import blocks_in_view, view_volume_m3
+from .cells import DEFAULT_CLAMP, LogOddsCells
+from .fusion import FUSIONS, Learnt, View, default_threads
+from .queries import MapQueries
+from .resample import coarsened, cropped, refined
+from .view import view_volume_m3
 
-FUSIONS = ("cell", "sum_of_rays")
-"""cell: one update a cell an observation. sum_of_rays: the paper read literally, every ray adds."""
-
-NOWHERE = 2**52
-"""An index beyond every cell."""
-FARTHEST_CELLS = 1e9
-"""A pose farther from the origin is a mistake, not a place."""
 WORKING_BYTES_PER_CELL = 24
 """A cell in view while it is updated and drawn: what is kept of it, its evidence, and room for the pool to grow."""
 
 
-class OccupancyGrid:
+class OccupancyGrid(MapQueries):
     """Occupancy probabilities of cubic cells of cell_m; cell (i, j, k) spans [i s, (i + 1) s) x ... in world.
 
     model: the sensor model, whose prior is the probability of a cell that was never updated. fusion: one of
-    FUSIONS. clamp: the largest absolute log-odds a cell may reach, None for no limit. memory_limit_gb: growth
-    beyond it raises MapTooLargeError and leaves the map as it was.
+    FUSIONS. clamp: lowest and highest log-odds that a cell may reach (one number: either way alike), None for no
+    limit: the map then does not depend on the order of the observations. memory_limit_gb: growth beyond it raises
+    MapTooLargeError and leaves the map as it was. threads: how many may share the work of one observation, by default
+    all processors up to 4; the map does not depend on it.
     """
 
     def __init__(
@@ -41,21 +41,28 @@ class OccupancyGrid:
         *,
         model: SensorModel | None = None,
         fusion: str = "cell",
-        clamp: float | None = 4.0,
+        clamp: float | Sequence[float] | None = DEFAULT_CLAMP,
         memory_limit_gb: float = 4.0,
+        threads: int | None = None,
     ) -> None:
         if not (np.isfinite(cell_m) and cell_m > 0):
             raise InvalidInputError(f"cell_m must be positive and finite, not {cell_m}")
         if fusion not in FUSIONS:
             raise unknown_name("fusion rule", fusion, FUSIONS)
-        if clamp is not None and not clamp > 0:
-            raise InvalidInputError(f"clamp must be a positive log-odds or None, not {clamp}")
         if not memory_limit_gb > 0:
             raise InvalidInputError(f"memory_limit_gb must be positive, not {memory_limit_gb}")
-        self.cell_m, self.fusion, self.clamp = float(cell_m), fusion, clamp
+        if threads is not None and not 1 <= threads <= 256:
+            raise InvalidInputError(f"threads must be 1 to 256, not {threads}")
+        self.cell_m, self.fusion = float(cell_m), fusion
+        self.threads = threads or default_threads()
         self.model = model or SensorModel()
         self.memory_limit_gb = memory_limit_gb
-        self.blocks = BlockStore(float(log_odds(self.model.prior)))
+        self.blocks = BlockStore(LogOddsCells(self.model.prior, _limits(clamp)))
+
+    @property
+    def clamp(self) -> tuple[float, float] | None:
+        """Lowest and highest log-odds that a cell may reach; None: no limit."""
+        return self.blocks.rule.clamp
 
     def __repr__(self) -> str:
         return (
@@ -75,51 +82,32 @@ class OccupancyGrid:
             )
 
     def integrate(
-        self, camera: StereoCamera, disparity: Disparity, T_world_cam: ArrayLike, motion_sigma_m: float = 0.0
+        self,
+        camera: StereoCamera,
+        disparity: Disparity,
+        T_world_cam: ArrayLike,
+        motion_sigma_m: float = 0.0,
+        *,
+        weight: float = 1.0,
     ) -> None:
         """Fuse one observation seen from T_world_cam (4, 4). motion_sigma_m: eps of Eq. 13 [m].
 
-        Raises InvalidInputError or MapTooLargeError and then leaves the map as it was.
+        weight: what of it is new, above 0 to 1 (frames from one place repeat their errors: see Mapper). Raises
+        InvalidInputError or MapTooLargeError and then leaves the map as it was.
         """
-        pose = as_pose(T_world_cam, "T_world_cam")
-        if np.abs(pose[:3, 3]).max() > FARTHEST_CELLS * self.cell_m:
-            raise InvalidInputError(f"T_world_cam is {np.abs(pose[:3, 3]).max():.3g} m from the origin: too far to map")
-        if disparity.disparity_px.shape != camera.shape:
-            raise InvalidInputError(f"the disparity is {disparity.disparity_px.shape}, the camera {camera.shape}")
-        if not (np.isfinite(motion_sigma_m) and motion_sigma_m >= 0):
-            raise InvalidInputError(f"motion_sigma_m must be >= 0 and finite, not {motion_sigma_m}")
+        view = View(camera, disparity, T_world_cam, self.cell_m, self.model, motion_sigma_m, weight)
         self.check_fits(camera)
-        blocks = blocks_in_view(camera, pose, self.cell_m, max_range_m=self.model.max_range_m)
-        evidence = self._evidence(camera, self._kernel_image(camera, disparity, motion_sigma_m), pose, blocks)
-        touched = ~np.isnan(evidence).all(axis=(1, 2, 3))
-        self._check_growth(blocks[touched])
-        rows = self.blocks.rows(blocks[touched])
-        limit = np.inf if self.clamp is None else self.clamp
-        add_evidence(rows, evidence[touched], self.blocks.log_odds, self.blocks.n_updates, limit)
+        self._fuse(FUSIONS[self.fusion](view, self.threads))
 
-    def _kernel_image(self, camera: StereoCamera, disparity: Disparity, motion_sigma_m: float) -> Array:
-        """(H, W, 2) float32: d and d / dd, where dd carries eps."""
-        d = disparity.disparity_px
-        sigma_px = widened_sigma_px(
-            camera, d, disparity.sigma_px, motion_sigma_m=motion_sigma_m, motion=self.model.motion
-        )
-        return np.stack([d, d / sigma_px], axis=-1).astype(np.float32)
-
-    def _evidence(self, camera: StereoCamera, image: Array, pose: FloatArray, blocks: Array) -> Array:
-        """(B, 16, 16, 16) float32 log-odds that the observation adds to the cells of blocks (B, 3); NaN: none."""
-        out = np.full((len(blocks), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
-        origin = blocks.min(axis=0)
-        lookup = np.full(blocks.max(axis=0) - origin + 1, -1, dtype=np.int64)
-        lookup[tuple((blocks - origin).T)] = np.arange(len(blocks))
-        intrinsics = (camera.focal_px, camera.cx_px, camera.cy_px, camera.focal_baseline_px_m)
-        constants = np.array([*intrinsics, self.cell_m, self.model.max_range_m])
-        parameters = kernel_parameters(self.model)
-        if self.fusion == "sum_of_rays":
-            sum_rays(lookup, origin, pose, constants, image, parameters, out)
-        else:
-            sweep_cells(blocks, pose, constants, image, parameters, out)
-            vote_hits(lookup, origin, pose, constants, image, parameters, out)
-        return out
+    def _fuse(self, learnt: Learnt) -> None:
+        touched = learnt.judged | learnt.free
+        self._check_growth(learnt.blocks[touched])
+        rows = np.full(len(touched), -1, dtype=np.int64)
+        rows[touched] = self.blocks.rows(learnt.blocks[touched])
+        judged, free = np.where(learnt.judged, rows, -1), rows[learnt.free]
+        rule, words = self.blocks.rule, self.blocks.words
+        rule.fuse(words, judged, learnt.evidence)
+        rule.fuse_whole(words, free, learnt.free_evidence[learnt.free])
 
     def _check_growth(self, blocks: Array) -> None:
         need_gb = self.blocks.bytes_with(blocks) / 1e9
@@ -145,11 +133,6 @@ class OccupancyGrid:
         """How often the cells at points (N, 3) in world [m] were updated, (N,) int."""
         return self.blocks.at(self._cells_at(points_m))[1]
 
-    def _cells_at(self, points_m: ArrayLike) -> Array:
-        """Indices (N, 3) int64 of the cells that hold points (N, 3) [m]; NaN and infinity get one never held."""
-        cells = np.floor(as_floats(points_m).reshape(-1, 3) / self.cell_m)
-        return np.where(np.abs(cells) < NOWHERE, cells, NOWHERE).astype(np.int64)
-
     def known_cells(self) -> tuple[Array, FloatArray]:
         """Indices (N, 3) int64 and probabilities (N,) of all cells ever updated."""
         cells, values = self.blocks.known()
@@ -158,11 +141,9 @@ class OccupancyGrid:
     def known_layer(self, height_m: float) -> Array:
         """Indices i, j (N, 2) int64 of the known cells at z = height_m [m] in world."""
         k = int(np.floor(height_m / self.cell_m))
-        layers = [np.empty((0, 2), dtype=np.int64)]
-        for index, _, known in self.blocks.in_order():
-            if index[2] == k // BLOCK:
-                layers.append(index[:2] * BLOCK + np.argwhere(known[:, :, k % BLOCK]))
-        return np.concatenate(layers)
+        cells, _ = self.blocks.known()
+        layer: Array = cells[cells[:, 2] == k, :2]
+        return layer
 
     def occupied_centres(self, threshold: float = 0.5) -> FloatArray:
         """Centres (N, 3) in world [m] of the known cells with p > threshold."""
@@ -172,16 +153,43 @@ class OccupancyGrid:
         centres: FloatArray = (cells + 0.5) * self.cell_m
         return centres
 
+    def crop(self, low_m: ArrayLike, high_m: ArrayLike) -> "OccupancyGrid":
+        """A new map of the cells whose centres lie in the box low_m <= c < high_m (3,) [m]; an end may be infinite."""
+        return self._holding(cropped(self.blocks, self.cell_m, low_m, high_m), self.cell_m)
+
+    def coarsened(self, factor: int) -> "OccupancyGrid":
+        """A new map of cells `factor` times larger: the largest log-odds and update count of their known children.
+
+        Cell i holds the cells c with c // factor = i.
+        """
+        return self._holding(coarsened(self.blocks, factor), self.cell_m * factor)
+
+    def refined(self, factor: int) -> "OccupancyGrid":
+        """A new map of cells `factor` times smaller, each a copy of the one that it lies in."""
+        return self._holding(refined(self.blocks, factor, limit_gb=self.memory_limit_gb), self.cell_m / factor)
+
+    def _holding(self, blocks: BlockStore, cell_m: float) -> "OccupancyGrid":
+        """A map with other cells that goes on as this one does."""
+        limit_gb = self.memory_limit_gb
+        grid = OccupancyGrid(
+            cell_m,
+            model=self.model,
+            fusion=self.fusion,
+            clamp=self.clamp,
+            memory_limit_gb=limit_gb,
+            threads=self.threads,
+        )
+        grid.blocks = blocks
+        return grid
+
     def sha256(self) -> str:
         """Digest of the cell size and of all known cells with their log-odds, whatever the order they came in.
 
         How often a cell was updated is not part of it.
         """
         digest = hashlib.sha256(np.float64(self.cell_m).tobytes())
-        for index, values, known in self.blocks.in_order():
-            if known.any():
-                digest.update(index.astype("<i8").tobytes() + np.packbits(known).tobytes())
-                digest.update(values[known].astype("<f4").tobytes())
+        cells, values = self.blocks.known()
+        digest.update(cells.astype("<i8").tobytes() + values.astype("<f4").tobytes())
         return digest.hexdigest()
 
     def save(self, path: str | Path) -> Path:
@@ -191,8 +199,46 @@ class OccupancyGrid:
         return save_grid(self, Path(path))
 
     @classmethod
-    def load(cls, path: str | Path) -> "OccupancyGrid":
-        """The map saved at path. Raises RecordingError when it is missing, damaged or of another version."""
-        from .mapfile import load_grid
+    def load(cls, path: str | Path, *, memory_limit_gb: float = 4.0) -> "OccupancyGrid":
+        """The map saved at path: .sgrid, or OctoMap's .bt or .ot.
 
-        return load_grid(Path(path))
+        Raises RecordingError when it is missing, damaged or of another version, MapTooLargeError beyond the limit.
+        """
+        from .mapfile import load_grid
+        from .octomap import SUFFIXES, load_octomap
+
+        load = load_octomap if Path(path).suffix in SUFFIXES else load_grid
+        return load(Path(path), memory_limit_gb=memory_limit_gb)
+
+    @classmethod
+    def from_cells(
+        cls, cell_m: float, cells: ArrayLike, log_odds: ArrayLike, n_updates: ArrayLike = 1, **options: Any
+    ) -> "OccupancyGrid":
+        """A map of cells (N, 3), all different, with log_odds (N,) and n_updates () or (N,); options as of the class.
+
+        Log-odds are rounded to 1 / 256 nat and clamped. Raises InvalidInputError or MapTooLargeError.
+        """
+        from .compose import fill
+
+        grid = cls(cell_m, **options)
+        fill(grid, cells, log_odds, n_updates)
+        return grid
+
+    def merge(self, other: "OccupancyGrid") -> None:
+        """Add what other has seen: log-odds and update counts add up, and are clamped. In any order the same.
+
+        Raises InvalidInputError when cell size, prior, clamp or fusion differ, MapTooLargeError beyond the memory
+        limit; the map is then as it was.
+        """
+        from .compose import merge
+
+        merge(self, other)
+
+
+def _limits(clamp: float | Sequence[float] | None) -> tuple[float, float] | None:
+    if clamp is None:
+        return None
+    limits = (-clamp, clamp) if isinstance(clamp, int | float) else tuple(clamp)
+    if len(limits) != 2:
+        raise InvalidInputError(f"clamp must be a lowest and a highest log-odds, one number or None, not {clamp}")
+    return float(limits[0]), float(limits[1])

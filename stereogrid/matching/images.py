@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InvalidInputError
 from ..observation import Disparity, Image, check_pair
+from .correlation import error_correlation_px
 
 WINDOW_COLUMNS, WINDOW_ROWS = 9, 7
 """An image must hold the search and a window so large [px]."""
@@ -44,10 +45,10 @@ def is_blank(left: Image, right: Image) -> bool:
     return any(bool((image == image[:1, :1]).all()) for image in (left, right))
 
 
-def nothing_known(image: Image) -> Disparity:
-    """The disparity of a pair in which nothing matches, for images (H, W) or (H, W, channels)."""
+def nothing_known(image: Image, *, matcher: str) -> Disparity:
+    """What a matcher of this name finds where nothing matches, for images (H, W) or (H, W, channels)."""
     unknown = np.full(image.shape[:2], np.nan, np.float32)
-    return Disparity(unknown, unknown)
+    return Disparity(unknown, unknown, error_correlation_px(matcher))
 
 
 def grey_of(image: Image) -> Image:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..errors import ConfigError, InvalidInputError, MissingExtraError
 from ..observation import Disparity, FloatImage, Image, check_pair
 from ..tomlfile import load_config
+from .correlation import error_correlation_px
 from .onnx_network import NetworkDescription
 from .sigma import GENERIC, disparity_sigma_px
 
@@ -21,7 +22,8 @@ class OnnxMatcher:
 
     A network answers everywhere. What is left out (NaN): disparities that are not positive, exceed num_disparities, or
     point outside the right image; and, with left_right_px > 0, those that differ by more than this from the disparity
-    found from the right image, for which the network runs twice. Sigma is that of no matcher in particular.
+    found from the right image, for which the network runs twice. Sigma and correlation length are those of no matcher
+    in particular.
     Raises MissingExtraError without onnxruntime, ConfigError or InvalidInputError naming the file that is wrong.
     """
 
@@ -54,7 +56,8 @@ class OnnxMatcher:
             # The right image, mirrored, sees the left one as a left image sees a right one.
             from_right = self._run(right[:, ::-1], left[:, ::-1])[:, ::-1]
             disparity_px[~agree(disparity_px, from_right, self.left_right_px)] = np.nan
-        return Disparity(disparity_px, disparity_sigma_px(left, right, disparity_px, matcher=GENERIC))
+        sigma_px = disparity_sigma_px(left, right, disparity_px, matcher=GENERIC)
+        return Disparity(disparity_px, sigma_px, error_correlation_px(GENERIC))
 
     def _run(self, left: Image, right: Image) -> FloatImage:
         feed = self._description.feed(left, right)

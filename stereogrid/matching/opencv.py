@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InvalidInputError
 from ..observation import Disparity, Image, check_pair
+from .correlation import error_correlation_px
 from .images import is_blank, nothing_known
 from .sigma import disparity_sigma_px
 
@@ -38,16 +39,17 @@ def match_padded(
 ) -> Disparity:
     """Run a cv2 matcher so that no columns are lost; NaN where nothing matched or the match is out of the image.
 
-    name: the matcher's in MATCHERS, whose sigma table serves.
+    name: the matcher's in MATCHERS, whose sigma and correlation length serve.
     """
     check_pair(left, right)
     check_size(left, num_disparities, block_px)
     if is_blank(left, right):
-        return nothing_known(left)
+        return nothing_known(left, matcher=name)
     # OpenCV gives no disparity for the first num_disparities columns: give it as many that do not count.
     padded = [cv2.copyMakeBorder(i, 0, 0, num_disparities, 0, cv2.BORDER_REPLICATE) for i in (left, right)]
     raw: NDArray[np.int16] = algorithm.compute(*padded)[:, num_disparities:]
     disparity_px = raw.astype(np.float32) / np.float32(FIXED_POINT)
     column = np.arange(left.shape[1], dtype=np.float32)
     disparity_px[(disparity_px <= 0) | (disparity_px > column)] = np.nan
-    return Disparity(disparity_px, disparity_sigma_px(left, right, disparity_px, matcher=name))
+    sigma_px = disparity_sigma_px(left, right, disparity_px, matcher=name)
+    return Disparity(disparity_px, sigma_px, error_correlation_px(name))

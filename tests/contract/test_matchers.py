@@ -6,6 +6,7 @@ import pytest
 
 from stereogrid.errors import InvalidInputError
 from stereogrid.matching import MATCHERS, matcher
+from stereogrid.matching.correlation import error_correlation_px
 from stereogrid.observation import Disparity, Matcher
 
 NUM_DISPARITIES = 32
@@ -83,6 +84,12 @@ def test_sigma_is_missing_exactly_where_disparity_is(chosen):
     found = chosen.match(left, right)
     assert 0 < found.density < 1
     np.testing.assert_array_equal(np.isnan(found.sigma_px), np.isnan(found.disparity_px))
+
+
+def test_how_far_its_errors_go_together_is_told_with_every_pair_even_where_nothing_matches(chosen, name):
+    covered = np.full(SHAPE, 90, np.uint8)
+    for pair in (shifted_pair(6.0), (covered, covered)):
+        assert chosen.match(*pair).correlation_px == error_correlation_px(name) < np.inf
 
 
 def test_no_columns_are_lost_to_the_search_range(chosen):

@@ -14,6 +14,7 @@ import trimesh
 from stereogrid import cli, mapping_run
 from stereogrid.camera import StereoCamera
 from stereogrid.config import MappingConfig, load_config
+from stereogrid.exporting import EXPORTS
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
 from stereogrid.matching import MATCHERS
@@ -168,6 +169,50 @@ def test_info_says_what_a_recording_and_a_map_hold(first_run, drive, capsys):
     assert f"{OccupancyGrid.load(cwd / 'mine.sgrid').n_known:,} known cells" in shown
 
 
+@pytest.mark.parametrize("suffix", EXPORTS)
+def test_a_map_is_exported_in_the_format_of_the_suffix(first_run, tmp_path, monkeypatch, capfd, suffix):
+    cwd, _ = first_run
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["export", str(cwd / "mine.sgrid"), f"mine{suffix}"]) == 0
+    assert Path(f"mine{suffix}").stat().st_size > 100
+    assert capfd.readouterr().err == ""
+
+
+def test_the_options_of_an_export_reach_its_format(first_run, tmp_path, monkeypatch):
+    cwd, _ = first_run
+    monkeypatch.chdir(tmp_path)
+    grid = str(cwd / "mine.sgrid")
+    assert cli.run(cli.app, ["export", grid, "text.pcd", "--ascii", "--threshold", "0.8"]) == 0
+    rows = Path("text.pcd").read_text().splitlines()
+    assert "DATA ascii" in rows
+    assert all(float(row.split()[3]) > 0.8 for row in rows[11:])
+    assert cli.run(cli.app, ["export", grid, "cubes.ply", "--cubes"]) == 0
+    assert len(trimesh.load("cubes.ply").faces) > 100
+    assert cli.run(cli.app, ["export", grid, "flat.pgm", "--low", "0.2", "--high", "0.6"]) == 0
+    assert {0, 254} <= set(np.unique(cv2.imread("flat.pgm", cv2.IMREAD_UNCHANGED)).tolist())
+
+
+@pytest.mark.parametrize("suffix", [".ot", ".bt"])
+def test_a_map_of_octomaps_is_scored_told_and_exported_like_one_of_ours(
+    first_run, drive, tmp_path, monkeypatch, capsys, suffix
+):
+    cwd, _ = first_run
+    monkeypatch.chdir(tmp_path)
+    ours, theirs = str(cwd / "mine.sgrid"), f"theirs{suffix}"
+    assert cli.run(cli.app, ["export", ours, theirs]) == 0
+    assert cli.run(cli.app, ["info", theirs]) == 0
+    assert f"{OccupancyGrid.load(ours).n_known:,} known cells" in capsys.readouterr().out
+    scores = []
+    for path in (ours, theirs):
+        assert cli.run(cli.app, ["score", path, str(drive), "--range", "2"]) == 0
+        scores.append(numbers_of(capsys.readouterr().out))
+    if suffix == ".ot":
+        assert scores[0] == scores[1]
+    assert scores[0]["coverage"] == scores[1]["coverage"]
+    assert float(scores[1]["auc"]) > 0.8
+    assert cli.run(cli.app, ["export", theirs, "again.ply"]) == 0
+
+
 def test_a_kitti_folder_is_known_from_its_path(tmp_path, monkeypatch, capsys):
     folder = write_kitti(tmp_path / "street")
     monkeypatch.chdir(tmp_path)
@@ -189,7 +234,10 @@ def test_the_help_of_map_names_every_matcher(capsys):
     assert all(re.search(rf"\b{name}\b", shown) for name in MATCHERS)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["map", "--help"], ["score", "--help"], ["info", "--help"]])
+COMMANDS = ("map", "score", "info", "export", "config")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
 def test_help_has_an_example(arguments, capsys):
     assert cli.run(cli.app, arguments) == 0
     shown = capsys.readouterr().out
@@ -268,6 +316,17 @@ def no_truth(folder, drive):
     return ["score", "map.sgrid", write_kitti(folder / "street")]
 
 
+def exporting(out, *options):
+    """The command that exports a map of one occupied cell to out, beside a folder.bt."""
+
+    def make(folder, drive):
+        OccupancyGrid.from_cells(0.1, np.array([[1, 2, 3]]), [2.0]).save(folder / "map.sgrid")
+        (folder / "folder.bt").mkdir()
+        return ["export", "map.sgrid", out, *options]
+
+    return make
+
+
 P_RIGHT = "P1: 80 0 59.5 {} 0 80 47.5 0 0 0 1 0"
 BAD_INPUT = {
     "a path that does not exist": (line("map", "nowhere.mcap"), r"nowhere\.mcap: no such file"),
@@ -321,6 +380,18 @@ BAD_INPUT = {
         text_file("my.toml", '[grid]\nfusion = "mean"\n', "map", "DRIVE", "--config", "my.toml"),
         "'mean'; choose from: cell, sum_of_rays",
     ),
+    "a clamp of one number": (
+        text_file("my.toml", "[grid]\nclamp = 6.0\n", "map", "DRIVE", "--config", "my.toml"),
+        r"my\.toml: 'grid\.clamp' must be a list, not 6\.0",
+    ),
+    "a clamp of three numbers": (
+        text_file("my.toml", "[grid]\nclamp = [-6.0, 0.0, 6.0]\n", "map", "DRIVE", "--config", "my.toml"),
+        "clamp must be a lowest and a highest log-odds",
+    ),
+    "a clamp upside down": (
+        text_file("my.toml", "[grid]\nclamp = [6.0, -6.0]\n", "map", "DRIVE", "--config", "my.toml"),
+        r"clamp must be .* around the prior's 0, or None; not 6\.0, -6\.0",
+    ),
     "an unknown matcher": (
         line("map", "DRIVE", "--matcher", "sgmb"),
         "no matcher named 'sgmb'; choose from: bm, .*sgbm",
@@ -338,6 +409,29 @@ BAD_INPUT = {
     "scoring a damaged map": (damaged_map, r"bad\.sgrid: not a sound map file"),
     "scoring without a truth": (no_truth, "no true mesh"),
     "scoring a map that is not there": (line("score", "no.sgrid", "DRIVE"), r"no\.sgrid: cannot be read"),
+    "scoring a damaged map of OctoMap's": (
+        text_file("a.bt", "# Octomap OcTree binary file\nid OcTree\n", "score", "a.bt", "DRIVE"),
+        r"a\.bt: not a sound OctoMap file: its header has no line 'data'",
+    ),
+    "exporting to no known format": (
+        exporting("map.obj"),
+        r"map\.obj: no format has the suffix '\.obj'; choose from: \.bt, \.glb, \.ot, \.pcd",
+    ),
+    "exporting to no suffix": (exporting("map"), r"suffix ''; choose from: \.bt"),
+    "exporting to a folder": (exporting("runs"), r"runs: no format has"),
+    "exporting to a folder with a suffix": (exporting("folder.bt"), r"folder\.bt: is a folder"),
+    "exporting into no folder": (exporting("nowhere/map.bt"), "nowhere: no such folder"),
+    "exporting where nothing can be written": (exporting("/proc/map.bt"), r"/proc/map\.bt: cannot be written"),
+    "exporting with another format's option": (
+        exporting("map.bt", "--cubes"),
+        r"\.bt has no option 'cubes'; it has none",
+    ),
+    "exporting heights without a cell": (
+        exporting("map.pgm", "--low", "9", "--high", "10"),
+        "no known cell lies between 9 and 10 m",
+    ),
+    "exporting what is not there": (line("export", "no.sgrid", "map.bt"), r"no\.sgrid: cannot be read"),
+    "exporting a recording": (line("export", "DRIVE", "map.bt"), r"drive\.mcap: not a sound map file"),
     "info on nothing": (line("info", "nowhere"), "nowhere: no such file"),
 }
 
@@ -382,6 +476,69 @@ def test_a_run_that_fails_half_way_leaves_no_hidden_folder(drive, tmp_path, monk
     assert list((tmp_path / "runs").iterdir()) == []
     assert not (tmp_path / "mine.sgrid").exists()
     assert "Traceback" not in capfd.readouterr().err
+
+
+# A map that outgrows its memory limit
+
+
+def far_apart(folder, n):
+    """A KITTI folder whose observations share no cell: the map grows by as much with each."""
+    write_kitti(folder, n)
+    rows = [pose_row(_11=10.0 * number) for number in range(n)]
+    (folder / "poses.txt").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+def map_within(limit_gb, street, *arguments):
+    """The exit code of mapping at 10 cm up to 3 m with that limit."""
+    grid = f"[grid]\ncell_m = 0.1\nmemory_limit_gb = {limit_gb}\n"
+    Path("tiny.toml").write_text(f"[model]\nmax_range_m = 3.0\n[matcher]\nnum_disparities = 16\n{grid}")
+    return cli.run(cli.app, ["map", str(street), "--config", "tiny.toml", *arguments])
+
+
+def test_growth_beyond_the_memory_limit_ends_with_an_error_that_names_it_and_the_map_so_far_is_saved(
+    tmp_path, monkeypatch, capfd
+):
+    monkeypatch.chdir(tmp_path)
+    n, limit_gb = 12, 0.0005
+    street = far_apart(tmp_path / "street", n)
+    assert map_within(limit_gb, street, "--out", "mine.sgrid") == 1
+    shown = capfd.readouterr()
+    assert len(shown.err.splitlines()) == 1
+    assert shown.out.strip() == ""
+    folder = Path("runs/latest").resolve()
+    said = re.fullmatch(
+        r"error: the map would grow to [\d.]+ GB, its limit is 0\.0005 GB: stopped after (\d+) of 12 observations; "
+        r"the map so far is saved in (\S+) and mine\.sgrid\n",
+        shown.err,
+    )
+    assert said, shown.err
+    n_mapped = int(said[1])
+    assert 1 <= n_mapped < n
+    assert Path(said[2]).resolve() == folder
+    assert {each.name for each in folder.iterdir()} == FILES
+    assert Path("mine.sgrid").read_bytes() == (folder / "map.sgrid").read_bytes()
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert shown.err.startswith(f"error: {metrics['stopped']}; ")
+    assert metrics["scores"]["disparity_density"]["n"] == n_mapped
+    assert metrics["stopped"] in (folder / "report.html").read_text().replace("&#x27;", "'")
+    assert not list(Path("runs").glob(".*"))
+
+    # It is the map that the observations before make where there is room.
+    beginning = far_apart(tmp_path / "beginning", n_mapped)
+    assert map_within(1.0, beginning, "--runs", "roomy") == 0
+    assert OccupancyGrid.load("mine.sgrid").sha256() == OccupancyGrid.load("roomy/latest/map.sgrid").sha256()
+    assert "stopped" not in json.loads(Path("roomy/latest/metrics.json").read_text())
+    assert OccupancyGrid.load("mine.sgrid").n_bytes <= limit_gb * 1e9
+
+
+def test_where_not_even_the_first_observation_fits_there_is_nothing_to_save(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    street = far_apart(tmp_path / "street", 3)
+    assert map_within(1e-5, street, "--out", "mine.sgrid") == 1
+    assert re.fullmatch(r"error: .*the limit is 1e-05 GB.*\n", capfd.readouterr().err)
+    assert not Path("runs").exists()
+    assert not Path("mine.sgrid").exists()
 
 
 # A real street

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +17,9 @@ from stereogrid.config import (
     save_config,
 )
 from stereogrid.errors import ConfigError, InvalidInputError
+from stereogrid.matching.correlation import temporal_share
 from stereogrid.motion import MotionError
+from stereogrid.observation import Disparity
 from stereogrid.sensor_model import SensorModel
 
 MINORU = StereoCamera(focal_px=834, cx_px=319.5, cy_px=239.5, baseline_m=0.06, width_px=640, height_px=480)
@@ -36,7 +39,12 @@ configs = st.builds(
         motion=st.sampled_from(["rss", "linear"]),
     ),
     motion_error=st.builds(MotionError, a_m=positive, b=positive, kappa=positive),
-    grid=st.builds(GridConfig, cell_m=positive, fusion=st.sampled_from(["cell", "sum_of_rays"]), clamp=positive),
+    grid=st.builds(
+        GridConfig,
+        cell_m=positive,
+        fusion=st.sampled_from(["cell", "sum_of_rays"]),
+        clamp=st.just(()) | st.tuples(positive.map(lambda low: -low), positive),
+    ),
 )
 
 
@@ -60,8 +68,9 @@ def test_what_a_file_does_not_say_keeps_its_default(tmp_path):
 
 
 def test_a_whole_number_will_do_where_a_float_is_expected(tmp_path):
-    clamp = from_text(tmp_path, "[grid]\nclamp = 3\n").grid.clamp
-    assert (clamp, type(clamp)) == (3.0, float)
+    grid = from_text(tmp_path, "[grid]\ncell_m = 3\nclamp = [-2, 3.5]\n").grid
+    assert (grid.cell_m, grid.clamp) == (3.0, (-2.0, 3.5))
+    assert [type(number) for number in (grid.cell_m, *grid.clamp)] == [float] * 3
 
 
 @pytest.mark.parametrize(
@@ -75,6 +84,8 @@ def test_a_whole_number_will_do_where_a_float_is_expected(tmp_path):
         ("[matcher]\nnum_disparities = 64.0\n", "'matcher.num_disparities' must be int, not 64.0"),
         ("[matcher]\nnum_disparities = true\n", "'matcher.num_disparities' must be int, not True"),
         ("[matcher]\nname = 3\n", "'matcher.name' must be str, not 3"),
+        ("[grid]\nclamp = 6.0\n", "'grid.clamp' must be a list, not 6.0"),
+        ('[grid]\nclamp = [-6.0, "high"]\n', "'grid.clamp[1]' must be float, not 'high'"),
         ("grid = 0.1\n", "'grid' must be a section, not 0.1"),
         ("[[grid]]\ncell_m = 0.1\n", "'grid' must be a section, not [{'cell_m': 0.1}]"),
         ("[model]\np_free = 0.7\n", "[model] expected 0 < p_free < prior < p_occupied < 1, not p_free 0.7"),
@@ -146,15 +157,43 @@ def test_a_mapper_is_built_as_the_config_says():
         MatcherConfig("sgbm", 48),
         SensorModel(max_range_m=3.0, form="printed"),
         MotionError(a_m=0.001),
-        GridConfig(cell_m=0.1, fusion="sum_of_rays", clamp=0.0, memory_limit_gb=1.0),
+        GridConfig(cell_m=0.1, fusion="sum_of_rays", clamp=(-2.0, 3.5), memory_limit_gb=1.0),
     )
     mapper = config.build_mapper(MINORU)
     assert repr(mapper.matcher) == "SemiGlobalMatcher(num_disparities=48, block_px=3)"
     assert mapper.grid.model == config.model
-    assert mapper.grid.clamp is None
+    assert mapper.grid.clamp == (-2.0, 3.5)
     assert (mapper.grid.cell_m, mapper.grid.fusion, mapper.grid.memory_limit_gb) == (0.1, "sum_of_rays", 1.0)
     assert mapper.motion_error == config.motion_error
     assert mapper.camera is MINORU
+
+
+def test_no_limits_are_written_as_an_empty_list_and_the_default_is_six_nats_either_way(tmp_path):
+    assert from_text(tmp_path, "[grid]\nclamp = []\n").build_mapper(MINORU).grid.clamp is None
+    assert from_text(tmp_path, "").build_mapper(MINORU).grid.clamp == (-6.0, 6.0)
+
+
+@pytest.mark.parametrize("limits", ["[3.0]", "[-1.0, 0.0, 1.0]"])
+def test_limits_that_are_not_two_are_refused(tmp_path, limits):
+    config = from_text(tmp_path, f"[grid]\nclamp = {limits}\n")
+    with pytest.raises(InvalidInputError, match="clamp must be a lowest and a highest log-odds, one number or None"):
+        config.build_mapper(MINORU)
+
+
+@pytest.mark.parametrize("limits", ["[6.0, -6.0]", "[1.0, 2.0]", "[0.0, 0.0]", "[nan, 1.0]", "[-inf, inf]"])
+def test_limits_that_do_not_lie_around_the_prior_or_are_not_finite_are_refused(tmp_path, limits):
+    config = from_text(tmp_path, f"[grid]\nclamp = {limits}\n")
+    with pytest.raises(InvalidInputError, match=r"within \+-1000, around the prior's 0, or None; not "):
+        config.build_mapper(MINORU)
+
+
+def test_a_mapper_weighs_by_the_reach_of_its_matchers_errors():
+    """A second look from the same place counts for the matcher's temporal share."""
+    wall = Disparity(np.full(MINORU.shape, 20.0, np.float32), np.float32(0.3))
+    for name in ("bm", "sgbm"):
+        novelty = MappingConfig(matcher=MatcherConfig(name)).build_mapper(MINORU).novelty
+        assert novelty.weight(wall, np.eye(4)) == 1
+        assert novelty.weight(wall, np.eye(4)) == pytest.approx(temporal_share(name))
 
 
 def test_a_mapper_of_an_unknown_matcher_is_refused_with_the_choices():

@@ -34,12 +34,7 @@ def drawn_map(seed=3, cell_m=0.1):
 
 def grid_of(cells, cell_m=0.1, value=2.0):
     """A map in which just these cells are occupied."""
-    cells = np.asarray(cells)
-    grid = OccupancyGrid(cell_m)
-    rows = grid.blocks.rows(cells // 16)
-    place = (rows, *(cells % 16).T)
-    grid.blocks.log_odds[place], grid.blocks.n_updates[place] = value, 1
-    return grid
+    return OccupancyGrid.from_cells(cell_m, cells, np.full(len(cells), value))
 
 
 def collection(figure, kind):

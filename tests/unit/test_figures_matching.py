@@ -150,12 +150,7 @@ def test_an_interval_is_drawn_from_its_low_to_its_high_end():
 
 
 def grid_of(cells):
-    cells = np.asarray(cells)
-    grid = OccupancyGrid(0.1)
-    rows = grid.blocks.rows(cells // 16)
-    place = (rows, *(cells % 16).T)
-    grid.blocks.log_odds[place], grid.blocks.n_updates[place] = 2.0, 1
-    return grid
+    return OccupancyGrid.from_cells(0.1, cells, np.full(len(cells), 2.0))
 
 
 @pytest.mark.parametrize(("end", "shape"), [((30, 3, 0), (2, 1)), ((3, 30, 0), (1, 2))])

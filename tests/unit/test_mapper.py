@@ -1,5 +1,7 @@
 """Match, model, integrate, and nothing else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from stereogrid.errors import InvalidInputError, MapTooLargeError, RecordingErro
 from stereogrid.geometry import from_yaw
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapper import Mapper
-from stereogrid.mapping_run import build_map
+from stereogrid.mapping_run import build_map, map_while_it_fits
 from stereogrid.motion import MotionError
 from stereogrid.observation import Observation, Odometry
 from stereogrid.sensor_model import SensorModel
@@ -97,11 +99,11 @@ class Drive(list):
 class Config:
     """Stands for a MappingConfig whose matcher is scripted."""
 
-    def __init__(self, made):
-        self.matcher = Scripted(made)
+    def __init__(self, made, memory_limit_gb=4.0):
+        self.matcher, self.memory_limit_gb = Scripted(made), memory_limit_gb
 
     def build_mapper(self, camera):
-        return Mapper(camera, self.matcher, OccupancyGrid(0.1, model=MODEL))
+        return Mapper(camera, self.matcher, OccupancyGrid(0.1, model=MODEL, memory_limit_gb=self.memory_limit_gb))
 
 
 def test_a_run_remembers_its_path_its_density_and_a_sample():
@@ -128,3 +130,38 @@ def test_given_disparities_take_the_matchers_place():
 def test_a_recording_without_observations_is_refused():
     with pytest.raises(RecordingError, match="no complete observation"):
         build_map(Drive(), Config([]))
+
+
+def test_a_drive_that_ends_before_its_first_quarter_has_a_sample():
+    class Promising(Drive):
+        def __len__(self):
+            return 100
+
+    mapped = build_map(Promising(observation(n) for n in range(2)), Config(disparities(2)))
+    assert mapped.sample[0].stamp_s == 1
+    assert mapped.stopped is None
+
+
+def far_apart(n):
+    """Observations that share no cell."""
+    for number in range(n):
+        each = observation(number)
+        yield replace(each, T_world_cam=from_yaw(0.0, [10.0 * number, 0, 0]) @ FORWARD)
+
+
+def test_a_map_that_outgrows_its_limit_holds_what_came_before_and_says_what_stopped_it():
+    made, drive = disparities(12), Drive(far_apart(12))
+    mapped = map_while_it_fits(drive, Config(made, memory_limit_gb=0.0006))
+    n = len(mapped.path_m)
+    assert 1 < n < 12
+    assert isinstance(mapped.stopped, MapTooLargeError)
+    assert "its limit is 0.0006 GB" in str(mapped.stopped)
+    assert mapped.density == pytest.approx(np.mean([each.density for each in made[:n]]))
+    before = build_map(Drive(drive[:n]), Config(made))
+    assert mapped.grid.sha256() == before.grid.sha256()
+    assert before.stopped is None
+
+
+def test_who_needs_the_whole_map_gets_an_error_where_it_does_not_fit():
+    with pytest.raises(MapTooLargeError, match=r"its limit is 0\.0006 GB"):
+        build_map(Drive(far_apart(12)), Config(disparities(12), memory_limit_gb=0.0006))

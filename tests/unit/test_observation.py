@@ -91,6 +91,17 @@ def test_one_impossible_pixel_is_refused_by_name(d, sigma, reason):
         Disparity(disparity_px, sigma_px)
 
 
+@pytest.mark.parametrize("length_px", [0.99, 0.0, -np.inf, np.nan])
+def test_errors_that_reach_less_far_than_their_own_pixel_are_refused(length_px):
+    with pytest.raises(InvalidInputError, match=rf"correlation_px must be 1 to inf, not {length_px}"):
+        Disparity(np.ones((2, 3)), 0.3, correlation_px=length_px)
+
+
+def test_errors_go_together_all_over_unless_one_says_otherwise():
+    assert Disparity(np.ones((2, 3)), 0.3).correlation_px == np.inf
+    assert Disparity(np.ones((2, 3)), 0.3, correlation_px=1).correlation_px == 1
+
+
 def test_disparity_and_sigma_of_different_size_are_refused():
     with pytest.raises(InvalidInputError, match=r"sigma_px must be one number or as disparity_px \(2, 3\), not \(3,\)"):
         Disparity(np.ones((2, 3)), np.ones(3))

@@ -16,10 +16,14 @@ from stereogrid.sensor_model import (
     depth_sigma_m,
     fuse,
     kernel_parameters,
+    likelihood_ratio,
+    likelihood_ratios,
     log_odds,
     occupancy_probability,
+    odds,
     probability,
     range_and_sigma_m,
+    reach_behind,
     widened_sigma_px,
 )
 
@@ -74,10 +78,6 @@ def test_eq3_the_first_reading_alone_is_the_belief(prior, p):
 @given(probabilities, probabilities, probabilities)
 def test_eq3_is_bayes_rule_for_independent_readings(prior, p, q):
     """By the odds: O(m|z1, z2) = O(m|z1) O(m|z2) / O(m)."""
-
-    def odds(x):
-        return x / (1 - x)
-
     expected = odds(p) * odds(q) / odds(prior)
     fused = fuse(fuse(log_odds(prior), p, prior), q, prior)
     assert np.exp(fused) == pytest.approx(expected, rel=1e-9)
@@ -145,21 +145,52 @@ def test_eq9_and_eq10_known_ray():
 
 @given(models, ranges_m, ranges_m, sigmas_m, cells_m)
 def test_eq11_stays_within_its_claims_for_every_range_error_and_cell(model, range_m, measured_m, sigma_m, cell_m):
+    hit, passed = likelihood_ratios(model)
+    ratio = likelihood_ratio(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
+    assert ratio > 0
+    assert passed - 1e-12 * hit <= ratio <= hit * (1 + 1e-12)
     p = occupancy_probability(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
     assert 0 < model.p_free - 1e-12 <= p <= model.p_occupied + 1e-12 < 1
 
 
+@given(models)
+def test_eq11_the_surest_ratios_lead_from_the_prior_to_the_claims(model):
+    hit, passed = likelihood_ratios(model)
+    assert passed < 1 < hit
+    assert fuse(0.0, model.p_occupied, model.prior) == pytest.approx(np.log(hit), abs=1e-9)
+    assert fuse(0.0, model.p_free, model.prior) == pytest.approx(np.log(passed), abs=1e-9)
+
+
+@given(models, ranges_m, ranges_m, sigmas_m, cells_m)
+def test_eq12_is_the_posterior_of_the_prior_under_the_likelihood_ratio(model, range_m, measured_m, sigma_m, cell_m):
+    """Bayes' rule by the odds: what Eq. 3 adds is the logarithm of the ratio, whatever the prior."""
+    ratio = likelihood_ratio(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
+    p = occupancy_probability(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
+    assert p / (1 - p) == pytest.approx(ratio * odds(model.prior), rel=1e-9)
+    assert fuse(0.0, p, model.prior) == pytest.approx(np.log(ratio), abs=1e-9)
+
+
 @given(models, sigmas_m, cells_m)
-def test_eq11_peak_is_the_probability_that_the_surface_lies_in_the_cell(model, sigma_m, cell_m):
-    hit = 2 * ndtr(cell_m / (2 * sigma_m)) - 1
-    p = occupancy_probability(4.0, 4.0, sigma_m, cell_m=cell_m, model=model)
-    assert p == pytest.approx(model.prior + (model.p_occupied - model.prior) * hit, abs=1e-12)
+def test_eq11_the_cell_that_is_read_weighs_hit_passed_and_hidden_by_their_probabilities(model, sigma_m, cell_m):
+    """Centred on the reading: in it with Phi(h) - Phi(-h), and as often in front of it as behind."""
+    within = 2 * ndtr(cell_m / (2 * sigma_m)) - 1
+    hit, passed = likelihood_ratios(model)
+    ratio = likelihood_ratio(4.0, 4.0, sigma_m, cell_m=cell_m, model=model)
+    assert ratio == pytest.approx(within * hit + (1 - within) * (passed + 1) / 2, rel=1e-9)
 
 
 def test_eq11_known_peak():
-    """A cell as wide as two sigmas holds the surface with 68.27 %: .5 + .4 x .6827."""
-    p = occupancy_probability(4.0, 4.0, 0.1, cell_m=0.2, model=SensorModel(p_occupied=0.9))
-    assert p == pytest.approx(0.773076, abs=1e-6)
+    """A cell as wide as two sigmas holds the surface with 68.27 %: 9 x .6827 + (1/3 + 1) / 2 x .3173 = 6.356 to 1."""
+    model = SensorModel(p_free=0.25, p_occupied=0.9)
+    assert likelihood_ratio(4.0, 4.0, 0.1, cell_m=0.2, model=model) == pytest.approx(6.355745, abs=1e-6)
+    assert occupancy_probability(4.0, 4.0, 0.1, cell_m=0.2, model=model) == pytest.approx(0.864052, abs=1e-6)
+
+
+@given(models, st.floats(-0.45, 0.45), cells_m)
+def test_eq11_a_thin_reading_claims_its_whole_cell_wherever_in_it_the_surface_lies(model, place, cell_m):
+    hit, _ = likelihood_ratios(model)
+    ratio = likelihood_ratio(4.0, 4.0 + place * cell_m, cell_m / 200, cell_m=cell_m, model=model)
+    assert ratio == pytest.approx(hit, rel=1e-9)
 
 
 @given(models, st.floats(0.001, 0.2), cells_m)
@@ -168,30 +199,69 @@ def test_eq11_a_sharper_reading_is_never_less_sure_of_its_own_cell(model, sigma_
     assert sharp >= blunt
 
 
+@pytest.mark.parametrize("cell_m", [0.02, 0.1, 0.6])
+@pytest.mark.parametrize("model", [SensorModel(), SensorModel(p_free=0.05, prior=0.2, p_occupied=0.7)])
+def test_eq12_is_the_mean_over_the_places_where_the_surface_may_lie(model, cell_m):
+    """Draw the surface around the reading: A where the cell holds it, F where it is passed, 1 where it is hidden."""
+    hit, passed = likelihood_ratios(model)
+    measured_m, sigma_m, n = 3.0, 0.1, 200_000
+    surface_m = np.random.default_rng(5).normal(measured_m, sigma_m, n)
+    for range_m in measured_m + np.array([-0.5, -0.2, -0.1, 0, 0.07, 0.15, 0.3, 0.5]):
+        near, far = range_m - cell_m / 2, range_m + cell_m / 2
+        each = np.select([surface_m < near, surface_m < far], [1.0, hit], passed)
+        ratio = likelihood_ratio(range_m, measured_m, sigma_m, cell_m=cell_m, model=model)
+        # Four standard errors of the mean; where all draws agree, three draws of n could have missed the rest.
+        assert ratio == pytest.approx(each.mean(), abs=4 * each.std() / np.sqrt(n) + 3 * hit / n)
+
+
+def shares(near_m, far_m, measured_m, sigma_m):
+    """How far the ratio of the cell from near_m to far_m is A, F and 1: it is linear in A and F, so three models tell.
+
+    Shapes broadcast; (3, ...).
+    """
+
+    def ratio(p_free, p_occupied):
+        model = SensorModel(p_free=p_free, p_occupied=p_occupied)
+        return likelihood_ratio((near_m + far_m) / 2, measured_m, sigma_m, cell_m=far_m - near_m, model=model)
+
+    # Odds of .1, .2, 4 and 9.
+    base = ratio(1 / 11, 0.8)
+    in_it = (ratio(1 / 11, 0.9) - base) / 5
+    behind_it = (ratio(1 / 6, 0.8) - base) / 0.1
+    return np.array([in_it, behind_it, base - 4 * in_it - 0.1 * behind_it])
+
+
+@given(sigmas_m, st.floats(-1, 1), st.integers(1, 12), st.floats(0.01, 0.3))
+def test_eq11_a_coarse_cell_holds_the_reading_of_its_parts(sigma_m, offset_m, n_parts, part_m):
+    """It holds the surface where one of them does, is passed where the last is, and hidden where the first is."""
+    edges_m = 5 + part_m * np.arange(n_parts + 1)
+    hit, passed, hidden = shares(edges_m[:-1], edges_m[1:], 5 + offset_m, sigma_m)
+    whole = shares(edges_m[0], edges_m[-1], 5 + offset_m, sigma_m)
+    np.testing.assert_allclose(whole, [hit.sum(), passed[-1], hidden[0]], atol=1e-9)
+
+
+@given(ranges_m, ranges_m, sigmas_m, cells_m)
+def test_eq11_the_three_shares_are_a_distribution(range_m, measured_m, sigma_m, cell_m):
+    found = shares(range_m - cell_m / 2, range_m + cell_m / 2, measured_m, sigma_m)
+    assert found.sum() == pytest.approx(1, abs=1e-9)
+    assert (found >= -1e-9).all()
+
+
 def test_eq11_the_cells_of_a_ray_share_one_surface():
     """The surface lies in exactly one cell: over a ray the hit parts sum to 1, whatever the error."""
-    cell_m = 0.05
-    centres = (np.arange(400) + 0.5) * cell_m
+    edges_m = 0.05 * np.arange(401)
     for sigma_m in (0.01, 0.07, 0.5):
-        # With p_free next to the prior only the hit part is left: p = prior + w (p_occupied - prior) hit.
-        model = SensorModel(p_free=np.nextafter(0.5, 0), prior=0.5, p_occupied=0.9)
-        p = occupancy_probability(centres, 10.012, sigma_m, cell_m=cell_m, model=model)
-        u, half = (centres - 10.012) / sigma_m, cell_m / 2 / sigma_m
-        weight = np.exp(-0.5 * np.maximum(np.abs(u) - half, 0) ** 2)
-        seen = weight > 1e-6
-        hit = (p[seen] - 0.5) / (0.4 * weight[seen])
-        assert hit.sum() == pytest.approx(1, abs=1e-3)
+        hit, _, _ = shares(edges_m[:-1], edges_m[1:], 10.012, sigma_m)
+        assert hit.sum() == pytest.approx(1, abs=1e-9)
 
 
-@given(models, sigmas_m, cells_m, st.floats(-0.999, 0.999))
-def test_eq12_is_continuous_through_the_measured_surface_and_all_of_its_cell(model, sigma_m, cell_m, place):
-    """The step of P_occ at l_p, from p_free to the prior, has no weight inside the cell that holds l_p."""
-    at = 5 + 0.5 * place * cell_m
-    step_m = 1e-7 * min(sigma_m, cell_m)
-    before, after = occupancy_probability([at - step_m, at + step_m], 5.0, sigma_m, cell_m=cell_m, model=model)
-    assert before == pytest.approx(after, abs=1e-5)
-    at_surface = occupancy_probability([5 - step_m, 5 + step_m], 5.0, sigma_m, cell_m=cell_m, model=model)
-    assert at_surface[0] == pytest.approx(at_surface[1], abs=1e-9)
+@given(models, sigmas_m, cells_m, st.floats(-8, 8), st.floats(1e-6, 1))
+def test_eq12_has_no_step_anywhere(model, sigma_m, cell_m, u, step):
+    """The print's jump of P_occ at l_p is gone: the slope is at most (A - F) phi(0) / dl."""
+    hit, passed = likelihood_ratios(model)
+    at_m = 50 + u * sigma_m
+    before, after = likelihood_ratio([at_m, at_m + step * sigma_m], 50.0, sigma_m, cell_m=cell_m, model=model)
+    assert abs(after - before) <= (hit - passed) * step / np.sqrt(2 * np.pi) + 1e-12 * hit
 
 
 @given(models, sigmas_m, cells_m)
@@ -205,11 +275,18 @@ def test_eq12_is_free_well_in_front_and_the_prior_well_behind(model, sigma_m, ce
 
 
 @given(models, sigmas_m, cells_m)
-def test_eq12_rises_towards_the_surface_and_falls_behind_it(model, sigma_m, cell_m):
-    reach_m = cell_m / 2 + 5 * sigma_m
-    p = occupancy_probability(60 + reach_m * np.linspace(-1, 1, 201), 60.0, sigma_m, cell_m=cell_m, model=model)
-    assert (np.diff(p[:101]) >= -1e-12).all()
-    assert (np.diff(p[100:]) <= 1e-12).all()
+def test_eq12_rises_to_one_peak_at_or_behind_the_surface_and_falls_from_there(model, sigma_m, cell_m):
+    """Where the slopes of both ends of the cell balance: u = ln((A - F) / (A - 1)) / (2 h).
+
+    It lies behind the surface because a cell in front loses to F, one behind only falls back to 1.
+    """
+    hit, passed = likelihood_ratios(model)
+    peak = np.log((hit - passed) / (hit - 1)) / (cell_m / sigma_m)
+    assert peak > 0
+    u = np.unique(np.concatenate([np.linspace(-8, 8, 201), np.linspace(-1, 1, 21) + peak, [peak]]))
+    p = occupancy_probability(60 + u * sigma_m, 60.0, sigma_m, cell_m=cell_m, model=model)
+    assert (np.diff(p[u <= peak]) >= -1e-12).all()
+    assert (np.diff(p[u >= peak]) <= 1e-12).all()
 
 
 @given(depths_m, sigmas_px, st.floats(0, 0.5))
@@ -285,3 +362,4 @@ def test_the_kernels_get_the_numbers_of_the_model():
     model = SensorModel(p_free=0.2, prior=0.4, p_occupied=0.8, form="printed")
     assert kernel_parameters(model) == (0.2, 0.8, 0.4, True, REACH_SIGMAS, REACH_SIGMAS)
     assert kernel_parameters(SensorModel())[3:] == (False, REACH_SIGMAS, REACH_BEHIND_SIGMAS)
+    assert (reach_behind(model), reach_behind(SensorModel())) == (REACH_SIGMAS, REACH_BEHIND_SIGMAS)

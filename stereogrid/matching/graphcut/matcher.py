@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...errors import InvalidInputError
 from ...observation import Disparity, FloatImage, Image
 from ..census import Side, shares_around, side_of
+from ..correlation import error_correlation_px
 from ..images import check_images, check_num_disparities, grey_of, is_blank, nothing_known, toned_as
 from ..meter import Meter, check_time_budget
 from ..sigma import disparity_sigma_px
@@ -80,7 +81,7 @@ class GraphCutMatcher:
         """Disparity of each pixel of the left image, (H, W) or (H, W, 3) uint8; NaN where the right one hides it."""
         first, second = check_images(left, right, self.num_disparities)
         if is_blank(first, second):
-            return nothing_known(first)
+            return nothing_known(first, matcher="gc")
         # In the tones of the left image; the census and sigma do not mind which.
         sides = [side_of(first), side_of(toned_as(first, second))]
         meter = Meter(3 * self.num_disparities, self.time_budget_s, self.progress)
@@ -92,7 +93,7 @@ class GraphCutMatcher:
         disparity_px = between_labels(path_costs, labels, agreed, sides[0].grey)
         disparity_px[~supported(sides, labels, agreed)] = np.nan
         sigma_px = disparity_sigma_px(sides[0].grey, sides[1].grey, disparity_px, matcher="gc")
-        return Disparity(disparity_px, sigma_px)
+        return Disparity(disparity_px, sigma_px, error_correlation_px("gc"))
 
     def _match_costs(self, sides: list[Side], threads: ThreadPoolExecutor) -> NDArray[np.uint8]:
         """Costs (H, W, D) of single pixels, half of the rows on each thread."""

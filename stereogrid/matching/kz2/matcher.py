@@ -7,6 +7,7 @@ import numpy as np
 
 from ...observation import Disparity, Image
 from ..census import shares_around, side_of
+from ..correlation import error_correlation_px
 from ..images import check_images, check_num_disparities, is_blank, nothing_known
 from ..meter import check_time_budget
 from ..sigma import disparity_sigma_px
@@ -47,7 +48,7 @@ class KolmogorovZabihMatcher:
         """Disparity of each pixel of the left image, (H, W) or (H, W, 3) uint8; NaN where it is unmatched."""
         images = check_images(left, right, self.num_disparities)
         if is_blank(*images):
-            return nothing_known(left)
+            return nothing_known(left, matcher="kz2")
         label, _ = self.labels(left, right)
         sides = [side_of(image) for image in images]
         grey_left, grey_right = (side.grey for side in sides)
@@ -60,7 +61,8 @@ class KolmogorovZabihMatcher:
         # K adapts itself to the pair: of two images that have nothing in common the energy matches most pixels.
         like_share, _ = shares_around(sides, np.maximum(label, 0).astype(np.int32), label >= 0, AROUND_PX)
         disparity_px[like_share < LIKE_SHARE] = np.nan
-        return Disparity(disparity_px, disparity_sigma_px(grey_left, grey_right, disparity_px, matcher="kz2"))
+        sigma_px = disparity_sigma_px(grey_left, grey_right, disparity_px, matcher="kz2")
+        return Disparity(disparity_px, sigma_px, error_correlation_px("kz2"))
 
     def labels(self, left: Image, right: Image) -> tuple[LabelImage, int]:
         """The labelling (H, W) int16, -1 = unmatched, and its energy in the units of the reference (see cost.py).

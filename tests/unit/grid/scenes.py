@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from stereogrid.camera import StereoCamera
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
+from stereogrid.grid.cells import ONE
 from stereogrid.observation import Disparity
 from stereogrid.sensor_model import SensorModel, log_odds
 
@@ -61,7 +62,8 @@ def contents(grid):
 # Maps of 0.1 m cells, seen up to 3 m
 
 MODEL = SensorModel(max_range_m=3.0)
-FREE_GAIN = np.float32(log_odds(MODEL.p_free) - log_odds(MODEL.prior))
+FREE_GAIN = np.float32(round((log_odds(MODEL.p_free) - log_odds(MODEL.prior)) * ONE) / ONE)
+"""In whole units of the fixed point, as the grid adds it."""
 
 
 def empty(**options):

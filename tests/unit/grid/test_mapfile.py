@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import tracemalloc
 import zlib
 from functools import cache
 
@@ -10,8 +11,8 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from stereogrid.errors import InvalidInputError, RecordingError
-from stereogrid.grid import OccupancyGrid
+from stereogrid.errors import InvalidInputError, MapTooLargeError, RecordingError
+from stereogrid.grid import OccupancyGrid, mapfile
 from stereogrid.sensor_model import SensorModel
 
 from .scenes import CAMERA, random_disparity, random_pose
@@ -77,10 +78,9 @@ def test_a_map_comes_back_bit_by_bit_with_all_that_it_was_made_with(tmp_path, cl
     back = OccupancyGrid.load(grid.save(tmp_path / "map.sgrid"))
     assert (back.cell_m, back.model, back.fusion, back.clamp) == (grid.cell_m, grid.model, grid.fusion, grid.clamp)
     assert back.sha256() == grid.sha256()
-    np.testing.assert_array_equal(back.blocks.indices(), grid.blocks.indices())
-    n = len(grid.blocks)
-    assert back.blocks.log_odds[:n].tobytes() == grid.blocks.log_odds[:n].tobytes()
-    assert back.blocks.n_updates[:n].tobytes() == grid.blocks.n_updates[:n].tobytes()
+    np.testing.assert_array_equal(back.blocks.indices(), grid.blocks.indices()[grid.blocks.in_order()])
+    words = grid.blocks.words[: len(grid.blocks)]
+    assert back.blocks.words[: len(back.blocks)].tobytes() == words[grid.blocks.in_order()].tobytes()
 
 
 def test_a_map_that_came_back_goes_on_like_the_one_that_stayed(map_file):
@@ -100,6 +100,40 @@ def test_an_empty_map_comes_back_empty(tmp_path):
 
 def test_the_same_map_is_saved_as_the_same_bytes(tmp_path, sound):
     assert drawn_map().save(tmp_path / "again.sgrid").read_bytes() == sound
+    assert OccupancyGrid.load(tmp_path / "again.sgrid").save(tmp_path / "third.sgrid").read_bytes() == sound
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@laws
+def test_the_same_cells_in_another_order_are_saved_as_the_same_bytes(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    cells = np.unique(rng.integers(-40, 40, (200, 3)), axis=0)
+    log_odds, counts = rng.uniform(-5, 5, len(cells)), rng.integers(1, 5000, len(cells))
+    other = rng.permutation(len(cells))
+    first = OccupancyGrid.from_cells(0.1, cells, log_odds, counts).save(tmp_path / "first.sgrid")
+    second = OccupancyGrid.from_cells(0.1, cells[other], log_odds[other], counts[other])
+    second.blocks.rows(np.array([[7, 7, -9], [0, 99, 0]]))  # blocks that know nothing leave no trace
+    assert second.save(tmp_path / "second.sgrid").read_bytes() == first.read_bytes()
+
+
+@pytest.mark.parametrize("clamp", [4.0, None])
+def test_saving_and_loading_take_little_more_memory_than_the_map(tmp_path, clamp):
+    grid = OccupancyGrid(0.1, clamp=clamp)
+    rows, rule = grid.blocks.rows(np.argwhere(np.ones((25, 25, 25)))), grid.blocks.rule
+    values = np.random.default_rng(3).integers(-1000, 1000, (len(rows), 512), dtype=rule.dtype)
+    grid.blocks.words[rows] = values << rule.count_bits | 1
+    assert grid.n_bytes > 30e6
+    del values
+    tracemalloc.start()
+    path = grid.save(tmp_path / "large.sgrid")
+    saving = tracemalloc.get_traced_memory()[1]
+    tracemalloc.reset_peak()
+    back = OccupancyGrid.load(path)
+    loading = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert saving < 10e6
+    assert loading < 1.1 * grid.n_bytes + 15e6
+    np.testing.assert_array_equal(back.blocks.words, grid.blocks.words[grid.blocks.in_order()])
 
 
 # Damage
@@ -130,16 +164,19 @@ def test_a_map_with_something_behind_it_is_refused(tmp_path, sound, extra):
 @given(content=st.binary(max_size=300))
 @example(b"")
 @example(b"SGRID 1\n")
-@example(b"SGRID 1\n{}\n")
+@example(b"SGRID 2\n")
 @example(b"SGRID 2\n{}\n")
+@example(b"SGRID 3\n{}\n")
 @laws
 def test_what_is_not_a_map_is_refused(tmp_path, content):
     refused(tmp_path / "other.sgrid", content)
-    refused(tmp_path / "other.sgrid", b"SGRID 1\n" + content)
+    refused(tmp_path / "other.sgrid", b"SGRID 2\n" + content)
 
 
 def test_another_version_is_named(tmp_path, sound):
-    assert "SGRID 1" in refused(tmp_path / "newer.sgrid", sound.replace(b"SGRID 1", b"SGRID 2", 1))
+    for version in (b"SGRID 1", b"SGRID 3"):
+        message = refused(tmp_path / "other.sgrid", sound.replace(b"SGRID 2", version, 1))
+        assert f"start with 'SGRID 2', not '{version.decode()}'" in message
 
 
 # Lies under a checksum that is right
@@ -160,7 +197,14 @@ anything = st.recursive(
 @example("cell_m", 10**400)
 @example("cell_m", 0)
 @example("cell_m", True)
+@example("n_blocks", 1.0)
 @example("clamp", [4])
+@example("clamp", ["-4", "4"])
+@example("clamp", [4, -4])
+@example("clamp", [-(10**400), 10**400])
+@example("clamp", [-3.0, 3.5])
+@example("clamp", None)
+@example("clamp", 3.0)
 @example("model", {"p_free": "0.3"})
 @example("model", {"p_free": 0.3, "surprise": 1})
 @example("fusion", ["cell"])
@@ -203,23 +247,78 @@ def test_a_map_that_claims_a_huge_number_of_blocks_is_refused_before_they_are_ma
     assert "1000000000 blocks cannot be in" in message
 
 
-@given(data=st.data(), value=st.sampled_from([np.nan, np.inf, -np.inf]))
+def test_a_map_that_is_larger_than_it_may_be_is_refused_before_room_is_made_for_it(tmp_path):
+    zeros = {"payload": bytes(20_000 * (24 + 2048)), "header": {"n_blocks": 20_000}}
+    path = tmp_path / "large.sgrid"
+    path.write_bytes(rebuilt(map_bytes(tmp_path), **zeros))
+    tracemalloc.start()
+    with pytest.raises(
+        MapTooLargeError, match=r"large\.sgrid: the map needs 0\.04 GB, the limit is 0\.02 GB"
+    ) as caught:
+        OccupancyGrid.load(path, memory_limit_gb=0.02)
+    assert tracemalloc.get_traced_memory()[1] < 5e6
+    tracemalloc.stop()
+    assert "\n" not in str(caught.value)
+
+
+def words_changed(sound, change):
+    """A map file whose words change(words (B, 512)) alters, with a checksum that is right."""
+    payload = bytearray(zlib.decompress(sound.split(b"\n", 2)[2][:-32]))
+    n = json.loads(sound.split(b"\n", 2)[1])["n_blocks"]
+    words = np.frombuffer(payload, "<i4", offset=24 * n).reshape(n, 512)
+    change(words)
+    return rebuilt(sound, payload=bytes(payload))
+
+
+@given(data=st.data(), past=st.sampled_from([1, 2, 1000]), side=st.sampled_from([-1, 1]))
 @laws
-def test_a_log_odds_that_is_not_finite_is_refused(tmp_path, sound, data, value):
+def test_a_cell_beyond_the_clamp_is_refused(tmp_path, sound, data, past, side):
+    rule = drawn_map().blocks.rule
+    limit = round((side * 3.0 - rule.prior_log_odds) * 256)
+
+    def change(words):
+        n, word = np.prod(words.shape), ((limit + side * past) << 12) + 1
+        words.flat[data.draw(st.integers(0, n - 1))] = word
+
+    assert "beyond the clamp" in refused(tmp_path / "clamp.sgrid", words_changed(sound, change))
+
+
+@given(data=st.data(), value=st.integers(-700, 700).filter(bool))
+@laws
+def test_a_value_without_an_update_is_refused(tmp_path, sound, data, value):
+    def change(words):
+        words.flat[data.draw(st.integers(0, words.size - 1))] = value << 12
+
+    assert "never updated has a value" in refused(tmp_path / "valued.sgrid", words_changed(sound, change))
+
+
+def with_indices(sound, change):
     payload = bytearray(zlib.decompress(sound.split(b"\n", 2)[2][:-32]))
-    n = len(drawn_map().blocks)
-    at = n * 24 + 4 * data.draw(st.integers(0, n * 4096 - 1))
-    payload[at : at + 4] = np.float32(value).tobytes()
-    assert "not finite" in refused(tmp_path / "nan.sgrid", rebuilt(sound, payload=bytes(payload)))
+    n = json.loads(sound.split(b"\n", 2)[1])["n_blocks"]
+    change(np.frombuffer(payload, "<i8", count=3 * n).reshape(n, 3))
+    return rebuilt(sound, payload=bytes(payload))
 
 
-def test_a_block_that_occurs_twice_is_refused(tmp_path, sound):
-    payload = bytearray(zlib.decompress(sound.split(b"\n", 2)[2][:-32]))
-    payload[24:48] = payload[:24]
-    assert "twice" in refused(tmp_path / "twice.sgrid", rebuilt(sound, payload=bytes(payload)))
+def test_blocks_that_occur_twice_or_out_of_order_are_refused(tmp_path, sound):
+    def twice(indices):
+        indices[1] = indices[0]
+
+    def swapped(indices):
+        indices[[0, 1]] = indices[[1, 0]]
+
+    for change in (twice, swapped):
+        assert "out of order, or one occurs twice" in refused(tmp_path / "o.sgrid", with_indices(sound, change))
 
 
-@pytest.mark.parametrize("change", [-1, 1, 4096 * 6 + 24])
+@pytest.mark.parametrize("index", [2**63 - 1, -(2**63), 2**49 + 1, -(2**49) - 1])
+def test_a_block_beyond_all_places_is_refused(tmp_path, sound, index):
+    def change(indices):
+        indices[-1 if index > 0 else 0] = index
+
+    assert "beyond all places" in refused(tmp_path / "far.sgrid", with_indices(sound, change))
+
+
+@pytest.mark.parametrize("change", [-1, 1, 512 * 4 + 24])
 def test_a_payload_of_another_length_is_refused(tmp_path, sound, change):
     payload = zlib.decompress(sound.split(b"\n", 2)[2][:-32])
     payload = payload[:change] if change < 0 else payload + bytes(change)
@@ -240,16 +339,21 @@ def test_a_missing_map_and_a_folder_are_refused_by_name(tmp_path):
         OccupancyGrid.load(tmp_path)
 
 
+def breaking_off(error):
+    """What writes half a file and then raises."""
+
+    def content(grid):
+        yield b"SGRID 2\n"
+        raise error
+
+    return content
+
+
 def test_a_save_that_is_interrupted_leaves_the_old_file_and_nothing_else(tmp_path, sound, monkeypatch):
     path = tmp_path / "map.sgrid"
     path.write_bytes(sound)
 
-    def interrupted(self, content):
-        with self.open("wb") as file:
-            file.write(content[: len(content) // 2])
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(type(path), "write_bytes", interrupted)
+    monkeypatch.setattr(mapfile, "_content", breaking_off(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         OccupancyGrid(0.5).save(path)
     assert path.read_bytes() == sound
@@ -259,11 +363,7 @@ def test_a_save_that_is_interrupted_leaves_the_old_file_and_nothing_else(tmp_pat
 def test_a_disk_that_is_full_is_reported_in_one_line_and_leaves_the_old_file(tmp_path, sound, monkeypatch):
     path = tmp_path / "map.sgrid"
     path.write_bytes(sound)
-
-    def full(self, content):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(type(path), "write_bytes", full)
+    monkeypatch.setattr(mapfile, "_content", breaking_off(OSError(28, "No space left on device")))
     with pytest.raises(InvalidInputError, match=r"map\.sgrid: cannot be written \(No space left on device\)"):
         OccupancyGrid(0.5).save(path)
     assert path.read_bytes() == sound

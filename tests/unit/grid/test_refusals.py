@@ -99,15 +99,15 @@ def test_cells_too_small_for_the_memory_are_refused_at_once_naming_the_need(cell
 def test_growth_past_the_limit_is_refused_and_the_map_stays_as_it_was():
     grid = mapped([FORWARD], [wall(2.0)])
     # Room for one view and its scratch, but not for the views of a drive.
-    grid.memory_limit_gb = 2 * grid.n_bytes / 1e9
+    grid.memory_limit_gb = 0.0003
     grid.check_fits(CAMERA)
-    elsewhere = [from_yaw(2.0 * n, [5.0 * n, 3, 1]) @ FORWARD for n in range(1, 9)]
+    elsewhere = [from_yaw(2.0 * n, [5.0 * n, 3, 1]) @ FORWARD for n in range(1, 30)]
     with pytest.raises(MapTooLargeError, match=r"would grow to .* GB, its limit is"):
         for T_world_cam in elsewhere:
-            before = grid.sha256(), len(grid.blocks), len(grid.blocks.log_odds)
+            before = grid.sha256(), len(grid.blocks), len(grid.blocks.words)
             grid.integrate(CAMERA, wall(2.0), T_world_cam)
     assert len(grid.blocks) > 0
-    assert (grid.sha256(), len(grid.blocks), len(grid.blocks.log_odds)) == before
+    assert (grid.sha256(), len(grid.blocks), len(grid.blocks.words)) == before
     # What needs no more room is still taken.
     grid.integrate(CAMERA, wall(2.0), FORWARD)
     assert grid.sha256() != before[0]

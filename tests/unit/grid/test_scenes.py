@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from stereogrid.camera import StereoCamera
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation, transform
 from stereogrid.grid import FUSIONS, OccupancyGrid
+from stereogrid.grid.cells import ONE
 from stereogrid.observation import Disparity
 from stereogrid.scoring.ground import camera_height
-from stereogrid.sensor_model import SensorModel, widened_sigma_px
+from stereogrid.sensor_model import REACH_BEHIND_SIGMAS, SensorModel, log_odds, widened_sigma_px
 
 from .scenes import (
     CAMERA,
@@ -54,7 +55,10 @@ def test_a_wall_is_occupied_where_it_stands_with_free_before_and_unknown_behind(
     # Behind the surface p falls to the prior from above, and many rays add up what little they claim there.
     claimed = grid.occupied_centres(0.6)
     assert len(claimed) > 100
-    assert np.abs(claimed[:, 0] - wall_x).max() < (1 if fusion == "cell" else 3) * grid.cell_m
+    reach_m = REACH_BEHIND_SIGMAS * depth_m**2 * 0.05 / CAMERA.focal_baseline_px_m
+    assert np.abs(claimed[:, 0] - wall_x).max() < (
+        0.51 * grid.cell_m + reach_m if fusion == "cell" else 3 * grid.cell_m
+    )
 
 
 @pytest.mark.parametrize("pitch_deg", [0, 10])
@@ -75,8 +79,10 @@ def test_a_floor_seen_at_a_grazing_angle_stays_where_it_is(pitch_deg, offset, se
         grid.integrate(camera, seen, pose)
     measured = camera_height(grid, path_m)
     assert measured.n > 500
-    # The cell that holds the plane, or its neighbour where the plane lies within the noise of their border.
-    assert measured.value == pytest.approx(height_m, abs=0.6 * cell_m)
+    # The cell that holds the plane, or its neighbour where the plane lies within the noise of their border: at 12 m,
+    # the noise of .15 px is so much of the height.
+    noise_m = height_m * 0.15 / camera.disparity_px(12.0)
+    assert measured.value == pytest.approx(height_m, abs=0.5 * cell_m + noise_m)
 
 
 # Fusion
@@ -94,26 +100,32 @@ def test_one_update_a_cell_or_one_a_ray_is_the_same_where_one_ray_crosses_a_cell
         # Of this width the last cell that the ray enters is the last whose centre is within the reach.
         grid.integrate(camera, Disparity(d, np.float32(0.12)), pose)
     cell, rays = (contents(grid) for grid in grids)
-    assert len(cell[0]) > 15
-    np.testing.assert_array_equal(cell[0], rays[0])
-    np.testing.assert_allclose(cell[1], rays[1], atol=1e-4)
+    assert len(rays[0]) > 15
+    # The cells beside the ray have the pixel in their footprints too; those on it learn the same.
+    learnt = dict(zip(map(tuple, cell[0].tolist()), cell[1].tolist(), strict=True))
+    # A ray enters its last cell where the cell's centre may be past the reach.
+    on_ray = [learnt.get(tuple(each), np.nan) for each in rays[0].tolist()]
+    np.testing.assert_allclose(on_ray[:-1], rays[1][:-1], atol=0.01)
 
 
 def test_the_sum_of_rays_counts_every_ray_through_a_near_cell():
     pose = FORWARD.copy()
     pose[:3, 3] = 0.013, 0.021, 0.034
-    cell, rays = (mapped([pose], [wall(2.5)], fusion=fusion, clamp=None) for fusion in FUSIONS)
+    # What an observation may add ends at 128 nat: more than 600 rays of this p_free.
+    model = replace(MODEL, p_free=0.45)
+    cell, rays = (mapped([pose], [wall(2.5)], fusion=fusion, clamp=None, model=model) for fusion in FUSIONS)
+    gain = float(log_odds(0.45))
     cells, values, _ = contents(rays)
     depths = (cells[:, 0] + 0.5) * rays.cell_m - pose[0, 3]
     free = (depths > 0.4) & (depths < 1.5)
-    k = values[free] / FREE_GAIN
-    np.testing.assert_allclose(k, np.round(k), rtol=2e-5)
+    k = values[free] / gain
+    np.testing.assert_allclose(k, np.round(k), atol=0.6 / ONE / abs(gain))
     near = free & (depths < 0.5) & (np.abs(cells[:, 1:]) <= 1).all(axis=1)
     # A cell of 0.1 m at 0.45 m covers (60 px 0.1 / 0.45)^2 pixels, about 180.
-    assert (values[near] / FREE_GAIN).min() > 120
-    assert np.nanmin(cell.blocks.known()[1]) == FREE_GAIN
+    assert (values[near] / gain).min() > 120
+    assert np.nanmin(cell.blocks.known()[1]) == pytest.approx(gain, abs=0.6 / ONE)
     # Every ray that is not cut off crosses each plane x = const once.
-    assert (values[free & (cells[:, 0] == 9)] / FREE_GAIN).sum() > CAMERA.width_px * CAMERA.height_px
+    assert (values[free & (cells[:, 0] == 9)] / gain).sum() > CAMERA.width_px * CAMERA.height_px
 
 
 @pytest.mark.parametrize("clamp", [0.5, 2.0, None])
@@ -146,7 +158,7 @@ def test_a_clamped_cell_answers_to_new_evidence_at_once():
 # The sensor model's options
 
 
-@given(prior=st.floats(0.35, 0.85), fusion=st.sampled_from(FUSIONS))
+@given(prior=st.floats(0.35, 0.85), fusion=st.sampled_from(sorted(FUSIONS)))
 @settings(max_examples=10, deadline=None, derandomize=True)
 def test_after_one_reading_a_free_cell_has_the_readings_probability_whatever_the_prior(prior, fusion):
     camera = replace(CAMERA, cx_px=40, cy_px=30)
@@ -157,8 +169,9 @@ def test_after_one_reading_a_free_cell_has_the_readings_probability_whatever_the
     grid = empty(model=replace(MODEL, prior=prior), fusion=fusion)
     grid.integrate(camera, Disparity(d, np.float32(0.1)), pose)
     free, hit = grid.probability([[1.05, 0.05, 0.05], [2.05, 0.05, 0.05]])
-    assert free == pytest.approx(MODEL.p_free, abs=1e-6)
-    assert prior < hit <= MODEL.p_occupied + 1e-6
+    # Rounded to 1 / 256 nat.
+    assert free == pytest.approx(MODEL.p_free, abs=1e-3)
+    assert prior < hit <= MODEL.p_occupied + 1e-3
 
 
 @given(seed=seeds, eps_m=st.tuples(st.floats(0, 0.4), st.floats(0, 0.4)))

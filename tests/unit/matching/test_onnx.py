@@ -9,7 +9,9 @@ import pytest
 
 from stereogrid.errors import ConfigError, InvalidInputError, MissingExtraError, StereogridError
 from stereogrid.matching import matcher
+from stereogrid.matching.correlation import error_correlation_px
 from stereogrid.matching.onnx import agree
+from stereogrid.matching.sigma import GENERIC
 from stereogrid.observation import Matcher
 
 SHAPE, SHIFT_PX = (50, 90), 9
@@ -102,6 +104,11 @@ def test_no_match_lies_outside_the_right_image_is_zero_or_beyond_the_range(plain
 def test_sigma_is_missing_exactly_where_disparity_is(plain):
     found = matcher("onnx", network=plain).match(*shifted_pair())
     np.testing.assert_array_equal(np.isnan(found.sigma_px), np.isnan(found.disparity_px))
+
+
+def test_its_errors_go_together_as_far_as_those_of_a_matcher_that_nobody_measured(plain):
+    found = matcher("onnx", network=plain).match(*shifted_pair())
+    assert found.correlation_px == error_correlation_px(GENERIC)
 
 
 def test_a_left_right_check_keeps_the_shift_and_drops_what_only_one_image_shows(plain):
