@@ -16,7 +16,7 @@ from ..geometry import Array, FloatArray, as_floats, as_pose, inverse
 from ..observation import Disparity
 from ..sensor_model import SensorModel, kernel_parameters, widened_sigma_px
 from .blocks import BLOCK, CELLS
-from .cells import NOTHING, to_evidence
+from .cells import LARGEST_EVIDENCE, NOTHING, ONE, to_evidence
 from .judgement import judgement
 from .literal import sum_rays
 from .pyramid import LEAST_CERTAINTY, Pyramid
@@ -116,7 +116,9 @@ def sum_of_rays(view: View, threads: int) -> Learnt:  # noqa: ARG001
     optics = (c.focal_px, c.cx_px, c.cy_px, c.focal_baseline_px_m, view.cell_m, view.model.max_range_m)
     gain = np.full((len(blocks), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
     sum_rays(lookup, origin, view.pose, np.array(optics), image, kernel_parameters(view.model), gain)
-    evidence = to_evidence(gain * np.float32(view.weight)).reshape(-1, CELLS)
+    # Cut off before it is weighed, or frames from one place would add what was cut off of the first.
+    most = np.float32(LARGEST_EVIDENCE / ONE)
+    evidence = to_evidence(np.clip(gain, -most, most) * np.float32(view.weight)).reshape(-1, CELLS)
     judged, free = (evidence != NOTHING).any(axis=1), np.zeros(len(blocks), np.bool_)
     return Learnt(blocks, judged, evidence, free, np.zeros(len(blocks), np.int16))
 

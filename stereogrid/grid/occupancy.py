@@ -112,7 +112,7 @@ class OccupancyGrid(MapQueries):
     def _check_growth(self, blocks: Array) -> None:
         need_gb = self.blocks.bytes_with(blocks) / 1e9
         if need_gb > self.memory_limit_gb:
-            raise MapTooLargeError(f"the map would grow to {need_gb:.2f} GB, its limit is {self.memory_limit_gb:g} GB")
+            raise MapTooLargeError(f"the map would grow to {need_gb:.4g} GB, its limit is {self.memory_limit_gb:g} GB")
 
     @property
     def n_bytes(self) -> int:
