@@ -50,6 +50,8 @@ class View:
             raise InvalidInputError(
                 f"the disparity is {self.disparity.disparity_px.shape}, the camera {self.camera.shape}"
             )
+        if min(self.camera.shape) < 2:
+            raise InvalidInputError(f"an image of {self.camera.shape} is too small to map: expected 2 x 2 px or more")
         if not (np.isfinite(self.eps_m) and self.eps_m >= 0):
             raise InvalidInputError(f"motion_sigma_m must be >= 0 and finite, not {self.eps_m}")
         if not 0 < self.weight <= 1:

@@ -2,6 +2,7 @@
 
 import time
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -111,3 +112,15 @@ def test_growth_past_the_limit_is_refused_and_the_map_stays_as_it_was():
     # What needs no more room is still taken.
     grid.integrate(CAMERA, wall(2.0), FORWARD)
     assert grid.sha256() != before[0]
+
+
+def test_an_image_of_one_row_is_refused():
+    camera = replace(CAMERA, height_px=1)
+    with pytest.raises(InvalidInputError, match=r"\(1, 80\) is too small to map"):
+        empty().integrate(camera, Disparity(np.full((1, 80), 5, np.float32), np.float32(0.2)), FORWARD)
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, 1.5, np.nan])
+def test_a_weight_that_is_no_share_is_refused(weight):
+    with pytest.raises(InvalidInputError, match="weight"):
+        empty().integrate(CAMERA, wall(2.0), FORWARD, weight=weight)

@@ -252,3 +252,22 @@ def test_each_form_reaches_as_far_behind_as_it_says(form):
     sigma_m = 1.5**2 * 0.2 / CAMERA.focal_baseline_px_m
     farthest = (cells[:, 0].max() + 0.5) * 0.02
     assert farthest == pytest.approx(1.5 + reach_behind(model) * sigma_m, abs=0.03)
+
+
+@given(seed=seeds, cell_m=st.sampled_from([0.001, 0.07, 3.0]), correlation_px=lengths)
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_extreme_but_finite_readings_leave_a_sound_map(seed, cell_m, correlation_px):
+    rng = np.random.default_rng(seed)
+    size = rng.integers(2, 12, 2)
+    focal_px = 10.0 ** rng.uniform(-2, 5)
+    camera = StereoCamera(focal_px, *rng.uniform(-50, 50, 2), 10.0 ** rng.uniform(-3, 3), int(size[0]), int(size[1]))
+    d = (10.0 ** rng.uniform(-37, 37, camera.shape)).astype(np.float32)
+    sigma = (10.0 ** rng.uniform(-37, 37, camera.shape)).astype(np.float32)
+    d[rng.random(camera.shape) < 0.3] = np.nan
+    grid = OccupancyGrid(cell_m, model=SensorModel(max_range_m=min(20 * cell_m, 5.0)), memory_limit_gb=1e9)
+    box = 20 * cell_m
+    for pose in (FORWARD, random_pose(rng, spread_m=box)):
+        grid.integrate(camera, Disparity(d, sigma, correlation_px), pose, motion_sigma_m=10.0 ** rng.uniform(-9, 9))
+    _, values, counts = contents(grid)
+    assert np.isfinite(values).all()
+    assert set(counts.tolist()) <= {1, 2}
