@@ -9,6 +9,8 @@ from .hashing import FREE_SLOT, add_rows, fill_slots, find_rows
 BLOCK = 8
 """Cells along the edge of a block."""
 CELLS = BLOCK**3
+FEWEST = 4096
+"""Room for so many blocks is made at first: a view or two, so that the first frames of a drive copy nothing."""
 
 
 class BlockStore:
@@ -66,7 +68,7 @@ class BlockStore:
     def _reserve(self, needed: int) -> None:
         if needed <= len(self.words):
             return
-        capacity = max(needed, 3 * len(self.words) // 2)
+        capacity = max(needed, 3 * len(self.words) // 2, FEWEST)
         # Zeros that nobody has touched take no memory yet: room to grow costs nothing.
         words = np.zeros((capacity, CELLS), dtype=self.rule.dtype)
         indices = np.zeros((capacity, 3), dtype=np.int64)
