@@ -47,7 +47,7 @@ class FusionConfig:
     drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
     model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
     grid: GridConfig = field(default_factory=lambda: GridConfig(cell_m=0.05))
-    frames: FramesConfig = field(default_factory=lambda: FramesConfig(n=40))
+    frames: FramesConfig = field(default_factory=lambda: FramesConfig(n=100))
     frame_seeds: int = 3
     frame_cells_m: tuple[float, ...] = (0.05, 0.1)
     street: StreetConfig = field(default_factory=StreetConfig)
