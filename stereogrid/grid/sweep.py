@@ -4,7 +4,7 @@ A block is worked in stages over small buffers: project its cells; gather readin
 the third are arithmetic alone, in float32 and without branches, and become vector instructions: Phi is a polynomial,
 the logarithm a table.
 
-All of them stand in this file: Numba's cache does not notice when a function inlined from another file changes.
+The stages stand in this file: Numba's cache does not notice when a function from another file changes.
 """
 
 import math
@@ -17,6 +17,7 @@ from ..geometry import Array
 from ..sensor_model import LOOKS_EXPONENT
 from .blocks import BLOCK, CELLS
 from .cells import LARGEST_EVIDENCE, NOTHING, ONE
+from .footprint import cell_offsets, extent, rectangle, to_cam
 from .judgement import Judgement
 
 SKIPPED, FREE, JUDGED = 0, 1, 2
@@ -44,13 +45,13 @@ def sweep_blocks(blocks: Array, part: tuple[int, int], view: Any, pyramid: Any, 
     """
     pose, focal, _, _, _, _, _, cell, range_max = view
     kinds, free_evidence, evidence = out
-    offsets, scratch = _cell_offsets(pose, cell), _scratch()
+    offsets, scratch = cell_offsets(pose, cell), _scratch()
     radius = 0.5 * math.sqrt(3.0) * (BLOCK - 1) * cell
     reach = 0.5 * (BLOCK - 1) * cell * (abs(pose[2, 0]) + abs(pose[2, 1]) + abs(pose[2, 2]))
     coarsest, rect = len(pyramid[3]) - 1, np.empty(4, np.int64)
     for b in range(part[0], part[1]):
         kinds[b] = SKIPPED
-        corner = _to_cam(pose, blocks[b, 0], blocks[b, 1], blocks[b, 2], cell)
+        corner = to_cam(pose, blocks[b, 0], blocks[b, 1], blocks[b, 2], cell)
         x, y = corner[0] + 0.5 * offsets[0, CELLS - 1], corner[1] + 0.5 * offsets[1, CELLS - 1]
         z = corner[2] + 0.5 * offsets[2, CELLS - 1]
         distance = math.sqrt(x * x + y * y + z * z)
@@ -109,11 +110,11 @@ def _whole(
     """Whether a block is free as a whole, or skipped as hidden or out of view, or must be judged cell by cell."""
     _, focal, cx, cy, _, width, height, cell, _ = view
     first, h, w = pyramid[3][level]
-    inside = _rectangle(corner, offsets, (focal, cx, cy, width, height), 1.0 / (1 << level), (h, w), rect)
+    inside = rectangle(corner, offsets, (focal, cx, cy, width, height), 1.0 / (1 << level), (h, w), rect)
     if rect[0] > rect[1]:
         return SKIPPED
     near, far = depths[0] - 0.5 * cell, depths[1] + 0.5 * cell
-    least, most, whole = _extent(pyramid[2], first, w, rect, (near, far))
+    least, most, whole = extent(pyramid[2], first, w, rect, (near, far))
     if near > most:
         return SKIPPED
     return FREE if inside and whole and in_range and far <= least else JUDGED
@@ -155,73 +156,6 @@ def _cells(
             _judge(readings, near_by, full, model, ratio)
         learnt += _write(ratio, chosen, count, model, strength, evidence)
     return learnt
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _to_cam(pose: Array, i: int, j: int, k: int, cell: float) -> tuple[float, float, float]:
-    """The centre of the first cell of a block, in cam."""
-    x, y, z = (i * BLOCK + 0.5) * cell, (j * BLOCK + 0.5) * cell, (k * BLOCK + 0.5) * cell
-    return (
-        pose[0, 0] * x + pose[0, 1] * y + pose[0, 2] * z + pose[0, 3],
-        pose[1, 0] * x + pose[1, 1] * y + pose[1, 2] * z + pose[1, 3],
-        pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3],
-    )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _cell_offsets(pose: Array, cell: float) -> Array:
-    """(3, 512) float32: from the first cell of a block to each, in cam."""
-    offsets = np.empty((3, CELLS), np.float32)
-    for axis in range(3):
-        for c in range(CELLS):
-            i, j, k = c // (BLOCK * BLOCK), c // BLOCK % BLOCK, c % BLOCK
-            offsets[axis, c] = (pose[axis, 0] * i + pose[axis, 1] * j + pose[axis, 2] * k) * cell
-    return offsets
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _rectangle(corner: Any, offsets: Array, camera: Any, scale: float, size: Any, rect: Array) -> bool:
-    """Fill rect with the first and last row and column of the nodes that a block's cells read; first > last: none.
-
-    Returns whether all of its cells are in the image.
-    """
-    focal, cx, cy, width, height = camera
-    left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
-    last = BLOCK - 1
-    for n in range(8):
-        c = (n & 1) * last + (n >> 1 & 1) * last * BLOCK + (n >> 2) * last * BLOCK * BLOCK
-        depth = corner[2] + offsets[2, c]
-        u, v = focal * (corner[0] + offsets[0, c]) / depth + cx, focal * (corner[1] + offsets[1, c]) / depth + cy
-        left, right, top, bottom = min(left, u), max(right, u), min(top, v), max(bottom, v)
-    if right < -0.5 or left >= width - 0.5 or bottom < -0.5 or top >= height - 0.5:
-        rect[0], rect[1] = 1, 0
-        return False
-    # A node to spare on each side: the cells are projected again in float32.
-    rect[0] = min(max(math.floor((top + 0.5) * scale - 0.51), 0), size[0] - 2)
-    rect[1] = min(math.floor((bottom + 0.5) * scale - 0.49) + 1, size[0] - 1)
-    rect[2] = min(max(math.floor((left + 0.5) * scale - 0.51), 0), size[1] - 2)
-    rect[3] = min(math.floor((right + 0.5) * scale - 0.49) + 1, size[1] - 1)
-    rect[1], rect[3] = max(rect[1], rect[0] + 1), max(rect[3], rect[2] + 1)
-    edge = 1e-3
-    return left >= edge - 0.5 and right < width - 0.5 - edge and top >= edge - 0.5 and bottom < height - 0.5 - edge
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
-def _extent(windows: Array, first: int, w: int, rect: Array, depths: Any) -> Any:
-    """The least depth up to which the windows of rect show free space, the largest from which they say nothing, and
-    whether each of them has a reading. Ends early where depths (from, to) are neither free nor hidden as a whole.
-    """
-    least, most, fewest = np.float32(np.inf), np.float32(-np.inf), np.float32(np.inf)
-    for row in range(rect[0], rect[1]):
-        begin, end = first + row * w + rect[2], first + row * w + rect[3]
-        of_row = windows[begin:end]
-        for n in range(len(of_row)):
-            least = min(least, of_row[n, 0])
-            most = max(most, of_row[n, 1])
-            fewest = min(fewest, of_row[n, 1])
-        if depths[0] <= most and depths[1] > least:
-            break
-    return least, most, fewest > 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
