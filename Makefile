@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test bench bench-grid lint types layers format wheel-check clean
+.PHONY: demo test test-slow bench bench-grid bench-render lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -12,6 +12,10 @@ demo: .venv/ready
 test: .venv/ready
 	$(PYTHON) -m pytest
 
+# What `make test` leaves out.
+test-slow: .venv/ready
+	$(PYTHON) -m pytest -m slow
+
 # Minutes on 2 cores; needs STEREOGRID_DATA, the folder of the real data.
 bench: bench-grid
 	$(PYTHON) -m experiments energy --pairs $(STEREOGRID_DATA)/stereo
@@ -20,8 +24,12 @@ bench: bench-grid
 # The grid's speed and memory beside OctoMap's; needs no data.
 bench-grid: .venv/ready
 	mkdir -p runs
-	$(PYTHON) -m pytest tests/bench --benchmark-json=runs/bench.json --benchmark-columns=min,median,max,rounds -q
+	$(PYTHON) -m pytest tests/bench/test_grid.py tests/bench/test_pipeline.py --benchmark-json=runs/bench.json --benchmark-columns=min,median,max,rounds -q
 	$(PYTHON) -m experiments grid-bench runs/bench.json
+
+# CPU time of the simulator's pictures and of a recorded drive; needs no data.
+bench-render: .venv/ready
+	$(PYTHON) -m pytest tests/bench/test_render.py --benchmark-columns=min,median,mean,max,rounds -q
 
 lint: .venv/ready
 	.venv/bin/ruff check .

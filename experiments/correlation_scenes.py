@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from sim.noise import IMAGE_NOISE, NoisyImages
+from sim.faults import PRESETS, FaultyCameras
 from sim.record import record_drive
 from stereogrid.camera import Rectification, StereoCamera
 from stereogrid.errors import RecordingError
@@ -54,7 +54,7 @@ class ShortDrive:
 
 
 def scenes(data: Path) -> Iterator[Scene]:
-    """Pairs with fine truth: the real ones under data/stereo, and a corridor's with every preset of noise."""
+    """Pairs with fine truth: the real ones under data/stereo, and a corridor's with CORRIDOR_FAULTS."""
     yield from (scene for scene in real_scenes(data) if scene.step_px <= COARSEST_STEP_PX)
     yield from corridor_scenes(CORRIDOR_SEED)
 
@@ -132,10 +132,10 @@ def _short_drive(seed: int, every_m: float, distance_m: float) -> ShortDrive:
         path = Path(folder) / "drive.mcap"
         record_drive(path, world="corridor", seed=seed, every_m=every_m, max_distance_m=distance_m)
         drive = open_recording(path)
-        noise = IMAGE_NOISE[DRIVE_NOISE]
+        faults = PRESETS[DRIVE_NOISE]
         # Each drive and each second look has noise of its own.
         base = 1000 * seed + round(100 * every_m)
-        views, others = ([_view(each) for each in NoisyImages(drive, noise, base + k)] for k in (0, 500))
+        views, others = ([_view(each) for each in FaultyCameras(drive, faults, base + k)] for k in (0, 500))
     return ShortDrive(drive.camera, views, {n: others[n] for n in range(0, len(views), EVERY_AGAIN)})
 
 

@@ -1,17 +1,21 @@
 """What the experiments on simulated drives share: the drive, the scores of a map, and which of them come first."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from sim.record import record_drive
-from sim.world import WORLDS
-from stereogrid.errors import InvalidInputError, unknown_name
+from sim.rendering.renderers import RASTER
+from sim.robot.pioneer import SimulationError
+from sim.worlds.world import WorldPlan
+from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Mapped
 from stereogrid.observation import Recording
+from stereogrid.recording import open_recording
 from stereogrid.scoring import Score
 from stereogrid.scoring.truth import MapTruth
 
@@ -32,17 +36,26 @@ HEADLINE = (
     "completeness_m",
 )
 """What the tables show of the scores in metrics.json."""
+FEWEST_PAIRS = 2
 OBSTACLES_M = (0.15, 2.4)
 """Heights between the floor and the ceiling of the corridor [m]."""
 OBSTACLE_SCORES = ("auc", "occupied_precision", "occupied_recall", "occupied_f1")
-OBSTACLE_MEANINGS = {
-    f"obstacle_{name}": f"{name} of the cells from {OBSTACLES_M[0]} to {OBSTACLES_M[1]} m" for name in OBSTACLE_SCORES
-}
+
+
+def obstacle_meanings(heights_m: Sequence[float]) -> dict[str, str]:
+    """What the scores of the obstacles are, for a report; heights_m: the lowest and the highest above the ground."""
+    return {
+        f"obstacle_{name}": f"{name} of the cells {heights_m[0]} to {heights_m[1]} m above the ground"
+        for name in OBSTACLE_SCORES
+    }
+
+
+OBSTACLE_MEANINGS = obstacle_meanings(OBSTACLES_M)
 
 
 @dataclass(frozen=True)
 class DriveConfig:
-    """A simulated drive. seed paints the world.
+    """A simulated drive. seed paints the world, in which so many people walk.
 
     every_m: distance between two pairs [m]. distance_m: how much of the path is driven, 0 = all [m].
     """
@@ -51,10 +64,10 @@ class DriveConfig:
     seed: int = 0
     every_m: float = 0.25
     distance_m: float = 0.0
+    people: int = 0
 
     def __post_init__(self) -> None:
-        if self.world not in WORLDS:
-            raise unknown_name("world", self.world, WORLDS)
+        WorldPlan(self.world, self.seed, self.people)
         if not (np.isfinite(self.every_m) and self.every_m > 0):
             raise InvalidInputError(f"every_m must be positive and finite, not {self.every_m}")
         for name in ("seed", "distance_m"):
@@ -63,16 +76,36 @@ class DriveConfig:
 
 
 def record(drive: DriveConfig, path: Path, stage: Stage) -> Path:
-    """Simulate the drive into an MCAP file."""
+    """Simulate the drive into an MCAP file.
+
+    A robot that is stuck or falls ends the drive, not the experiment: the recording's metadata say why, and so does
+    `about`. Raises SimulationError when it never moved.
+    """
     with stage("driving", 1) as step:
-        return record_drive(
-            path,
-            world=drive.world,
-            seed=drive.seed,
-            every_m=drive.every_m,
-            max_distance_m=drive.distance_m or None,
-            progress=step.to,
-        )
+        try:
+            record_drive(
+                path,
+                world=drive.world,
+                seed=drive.seed,
+                people=drive.people,
+                every_m=drive.every_m,
+                max_distance_m=drive.distance_m or None,
+                progress=step.to,
+            )
+        except SimulationError as error:
+            if len(open_recording(path)) < FEWEST_PAIRS:
+                raise SimulationError(f"{error.__cause__}, before there was anything to map") from error
+            print(f"{error.__cause__}; going on with the drive up to there", file=sys.stderr)
+    return path
+
+
+def open_drive(path: Path) -> Recording:
+    """A recorded drive that is to be scored. Raises RecordingError when it was drawn for a quick look alone."""
+    drive = open_recording(path)
+    renderer = _metadata(drive).get("renderer", RASTER)
+    if renderer != RASTER:
+        raise RecordingError(f"{path}: drawn by the renderer {renderer!r}, which is never for scores; use {RASTER!r}")
+    return drive
 
 
 def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
@@ -89,5 +122,9 @@ def score_grid(truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid) -> lis
 
 def about(drive: Recording) -> dict[str, str]:
     """Facts of a drive for a report: a reused one tells its own seed and spacing, which the config may not."""
+    return {"pairs": str(len(drive)), **{f"drive {key}": value for key, value in _metadata(drive).items()}}
+
+
+def _metadata(drive: Recording) -> Mapping[str, str]:
     metadata: Mapping[str, str] = getattr(drive, "metadata", {})
-    return {"pairs": str(len(drive)), **{f"drive {key}": value for key, value in metadata.items()}}
+    return metadata

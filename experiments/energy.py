@@ -1,10 +1,12 @@
 """kz2's energies and times beside those of the published reference, in the reference's units."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from stereogrid.matching.kz2 import KolmogorovZabihMatcher
+from stereogrid.report import ReportTable
 
 from .matched_pairs import at_most
 from .pairs import Pair, open_pairs
@@ -56,3 +58,14 @@ def measure(pair: Pair) -> EnergyResult:
     _, energy = matcher.labels(pair.left, pair.right)
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
     return EnergyResult(pair.name, energy, cpu_s, wall_s, REFERENCE.get(pair.name))
+
+
+def screen_table(results: Sequence[EnergyResult]) -> ReportTable:
+    """A row a pair."""
+    header = ["pair", "energy", "less the reference's best", "CPU s", "wall s", "CPU / reference's"]
+    rows = []
+    for each in results:
+        best, seconds = each.reference or (None, None)
+        relation = ("-", "-") if best is None else (f"{each.energy - best}", f"{each.cpu_s / seconds:.2f}")
+        rows.append([each.pair, str(each.energy), relation[0], f"{each.cpu_s:.1f}", f"{each.wall_s:.1f}", relation[1]])
+    return ReportTable("Energies", header, rows)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sim.noise import image_noise
+from sim.faults import camera_faults
 from sim.rig import MINORU
 from stereogrid.config import GridConfig, MappingConfig, save_config
 from stereogrid.errors import InvalidInputError, unknown_name
@@ -19,7 +19,7 @@ from stereogrid.runs import finished_path, run_folder
 from stereogrid.sensor_model import SensorModel
 
 from .compared import Compared
-from .drives import DriveConfig, about, record
+from .drives import DriveConfig, about, open_drive, record
 from .frames import FramesConfig
 from .fusion_drive import Drive, compare_on_drive, compare_on_frames
 from .fusion_report import CLAMPS, REAL, SIMULATED, Worlds, write_results
@@ -34,9 +34,9 @@ class FusionConfig:
     """Every parameter of the experiment; the file config.toml of a run holds them.
 
     matchers: seen on the drive; kz2 takes 18 s a pair. n_seeds: image noise is drawn with the seeds 1, 2, ... n_seeds.
-    image_noise: a preset of sim.noise. num_disparities: searched on the drive. clamps_of: the matcher whose maps show
-    what clamps do, "" for none. frame_seeds: worlds of frames with independent noise, 0 for none. frame_cells_m: the
-    cells that these are mapped with [m]. street, room: the real sequences, where there are any.
+    image_noise: see sim.faults.camera_faults. num_disparities: searched on the drive. clamps_of: the matcher whose maps
+    show what clamps do, "" for none. frame_seeds: worlds of frames with independent noise, 0 for none. frame_cells_m:
+    the cells that these are mapped with [m]. street, room: the real sequences, where there are any.
     """
 
     matchers: tuple[str, ...] = ("bm", "sgbm", "gc")
@@ -54,7 +54,7 @@ class FusionConfig:
     room: RoomConfig = field(default_factory=RoomConfig)
 
     def __post_init__(self) -> None:
-        image_noise(self.image_noise)
+        camera_faults(self.image_noise)
         for name in ("n_seeds", "num_disparities"):
             if not getattr(self, name) > 0:
                 raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
@@ -90,10 +90,10 @@ def run(
     """
     if data is not None and not data.is_dir():
         raise InvalidInputError(f"{data}: no such folder of data")
-    reused = open_recording(recording) if recording else None
+    reused = open_drive(recording) if recording else None
     with run_folder(runs, "fusion") as folder:
         save_config(config, folder / "config.toml")
-        drive = reused or open_recording(record(config.drive, folder / "drive.mcap", stage))
+        drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         real, skipped = compare_real(data, config, stage)  # first: damaged data are refused early
         on_drive = compare_drive(drive, config, stage)
         worlds: Worlds = {

@@ -7,7 +7,7 @@ from threading import Event
 
 import numpy as np
 
-from sim.noise import NoisyImages, image_noise
+from sim.faults import FaultyCameras, camera_faults
 from stereogrid.config import MappingConfig
 from stereogrid.mapping_run import Mapped, Track, build_map
 from stereogrid.observation import Recording
@@ -38,7 +38,7 @@ class Seeing:
 
     def noisy(self, drive: Recording, seed: int) -> Recording:
         """The drive as every contender sees it: true poses, and image noise that depends on the seed alone."""
-        return NoisyImages(TruePoses(drive), image_noise(self.noise), seed)
+        return TruePoses(FaultyCameras(drive, camera_faults(self.noise), seed))
 
 
 @dataclass(frozen=True)

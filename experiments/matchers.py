@@ -9,17 +9,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sim.noise import image_noise
+from sim.faults import camera_faults
 from sim.rig import MINORU
 from stereogrid.config import GridConfig, MappingConfig, save_config
 from stereogrid.errors import InvalidInputError, unknown_name
-from stereogrid.recording import open_recording
 from stereogrid.report import ReportTable
 from stereogrid.runs import finished_path, run_folder
 from stereogrid.sensor_model import SensorModel
 
 from .contenders import Contender, default_table, read_contenders
-from .drives import DriveConfig, about, record
+from .drives import DriveConfig, about, open_drive, record
 from .matched_maps import Seeing, map_drive, truth_of
 from .matched_pairs import PairResult, at_most, match_pairs
 from .matchers_report import write_results
@@ -32,8 +31,8 @@ class MatchersConfig:
     """Every parameter of the experiment; the file config.toml of a run holds them.
 
     reference: the contender that the others are compared with. most_pixels: larger pairs are shrunk. n_seeds: image
-    noise is drawn with the seeds 1, 2, ... n_seeds. image_noise: a preset of sim.noise. num_disparities: searched on
-    the drive. contenders: sections as contenders.Contender has them, by name.
+    noise is drawn with the seeds 1, 2, ... n_seeds. image_noise: see sim.faults.camera_faults. num_disparities:
+    searched on the drive. contenders: sections as contenders.Contender has them, by name.
     """
 
     reference: str = "bm"
@@ -47,7 +46,7 @@ class MatchersConfig:
     contenders: dict = field(default_factory=default_table)
 
     def __post_init__(self) -> None:
-        image_noise(self.image_noise)
+        camera_faults(self.image_noise)
         for name in ("most_pixels", "n_seeds", "num_disparities"):
             if not getattr(self, name) > 0:
                 raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
@@ -84,10 +83,10 @@ def run(
     """
     place = pairs or default_pairs()
     known = [at_most(pair, config.most_pixels) for pair in open_pairs(place)] if place else []
-    reused = open_recording(recording) if recording else None
+    reused = open_drive(recording) if recording else None
     with run_folder(runs, "matchers") as folder:
         save_config(config, folder / "config.toml")
-        drive = reused or open_recording(record(config.drive, folder / "drive.mcap", stage))
+        drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         truth = truth_of(drive, config.seeing, stage)  # first: a drive without a truth is refused at once
         on_pairs = compare_on_pairs(known, config, stage)
         by_map = map_drive(drive, truth, config.contending, seeing=config.seeing, stage=stage)

@@ -21,7 +21,7 @@ from stereogrid.figures import save_figure
 from stereogrid.files import written_beside
 from stereogrid.matching import MATCHERS, matcher
 from stereogrid.matching.sigma import GENERIC, SigmaTable, sigma_tables
-from stereogrid.report import write_metrics
+from stereogrid.report import ReportTable, write_metrics
 from stereogrid.runs import finished_path, run_folder
 
 from .parallel import Stage, in_parallel
@@ -59,6 +59,17 @@ class Row:
     def within(self) -> bool:
         """Whether both shares are right to MARGIN."""
         return all(abs(getattr(self, name) - share) <= MARGIN for name, share in SHARES.items())
+
+
+def screen_table(rows: Sequence[Row]) -> ReportTable:
+    """A row a matcher and kind of scenes; a star where a share is off by more than the margin."""
+    header = ["matcher", "fitted on", "tested on", "1s", "2s", "", "1s raw", "2s raw", "1s all", "2s all"]
+    shown = []
+    for row in rows:
+        shares = (row.one_raw, row.two_raw, row.one_all, row.two_all)
+        found = (f"{row.one:.1f}", f"{row.two:.1f}", "" if row.within else "*", *(f"{share:.1f}" for share in shares))
+        shown.append([row.matcher, row.fitted_on, row.scenes, *found])
+    return ReportTable("Sigma", header, shown, n_names=3)
 
 
 def run(

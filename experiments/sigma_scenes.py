@@ -8,8 +8,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from sim.noise import IMAGE_NOISE, ImageNoise
+from sim.faults import CameraFaults, FaultyPair, camera_faults
 from sim.record import record_drive
+from stereogrid.camera import StereoCamera
 from stereogrid.geometry import FloatArray
 from stereogrid.observation import FloatImage, Image, Observation
 from stereogrid.recording import open_recording
@@ -31,12 +32,16 @@ CORRIDOR_DISPARITIES = 80
 CORRIDOR_WEIGHT, PLANES_WEIGHT = 0.75, 0.25
 """Errors on drawn planes are smaller than cameras allow: they are there to keep the tables from running wild."""
 PLANES_SHAPE = (300, 400)
-PLANES_NOISE = {
-    "clean": ImageNoise(),
-    "faint": ImageNoise(blur_px=0.3, gain_mismatch=0.01, read_noise_gray=0.7),
-    "plain": ImageNoise(blur_px=0.6, gain_mismatch=0.03, read_noise_gray=1.5),
-    "strong": ImageNoise(blur_px=0.8, gain_mismatch=0.05, read_noise_gray=3.0),
+_PLANES_CAMERA = StereoCamera(520.0, 199.5, 149.5, 0.06, PLANES_SHAPE[1], PLANES_SHAPE[0])
+CORRIDOR_FAULTS = {name: camera_faults(name, calibration_error_deg=0.0).still for name in ("ideal", "mild", "minoru")}
+"""Sigma is of what the matcher errs by: a calibration that is wrong shifts all of a picture's disparities alike."""
+PLANES_FAULTS = {
+    "clean": CameraFaults(),
+    "faint": CameraFaults(defocus_px=0.3, exposure_mismatch=0.03, full_well_e=33000),
+    "plain": CameraFaults(defocus_px=0.6, exposure_mismatch=0.08, full_well_e=7200),
+    "strong": CameraFaults(defocus_px=0.8, exposure_mismatch=0.14, full_well_e=1800),
 }
+"""Shot noise of .7, 1.5 and 3 gray levels."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,7 @@ def real_scenes(data: Path) -> Iterator[Scene]:
 
 
 def corridor_scenes(seed: int) -> Iterator[Scene]:
-    """Views of the corridor painted by seed, each with every preset of noise."""
+    """Views of the corridor painted by seed, each with each of CORRIDOR_FAULTS."""
     with tempfile.TemporaryDirectory() as folder:
         drive = open_recording(record_drive(Path(folder) / "drive.mcap", world="corridor", seed=seed, every_m=2.0))
         observations = list(drive)
@@ -91,8 +96,8 @@ def corridor_scenes(seed: int) -> Iterator[Scene]:
         truth_px = drive.camera.disparity_px(np.where(depth_m > 0, depth_m, np.nan)).astype(float)
         truth_px[truth_px == 0] = np.nan
         pair = observations[n].left, observations[n].right
-        for preset, noise in IMAGE_NOISE.items():
-            left, right = _taken(pair, noise, [seed, n])
+        for preset, faults in CORRIDOR_FAULTS.items():
+            left, right = FaultyPair(drive.camera, faults, seed).taken(pair, n)
             group = f"corridor {seed}"
             visible = seen_by_both(truth_px)[0]
             count, weight = CORRIDOR_DISPARITIES, CORRIDOR_WEIGHT
@@ -105,19 +110,14 @@ def _depth_m(observation: Observation) -> FloatImage:
     return observation.truth.depth_m
 
 
-def _taken(pair: tuple[Image, Image], noise: ImageNoise, seed: list[int]) -> tuple[Image, Image]:
-    left, right = (noise.apply(image, np.random.default_rng([*seed, side])) for side, image in enumerate(pair))
-    return left, right
-
-
 def plane_scenes(seed: int) -> Iterator[Scene]:
-    """Slanted, textured planes before one another, each set seen with every noise of PLANES_NOISE."""
+    """Slanted, textured planes before one another, each set seen with each of PLANES_FAULTS."""
     for n in range(2):
         rng = np.random.default_rng([seed, n])
         pair, truth_px = draw_planes(rng)
         count = (int(np.ceil(truth_px.max())) + 16) // 16 * 16
-        for name, noise in PLANES_NOISE.items():
-            left, right = _taken(pair, noise, [seed, n])
+        for name, faults in PLANES_FAULTS.items():
+            left, right = FaultyPair(_PLANES_CAMERA, faults, seed).taken(pair, n)
             visible = seen_by_both(truth_px)[0]
             yield Scene("planes", f"planes, {name}", left, right, truth_px, visible, count, weight=PLANES_WEIGHT)
 

@@ -1,4 +1,4 @@
-"""How the renderer's kernels are compiled: cached, and free of the interpreter's lock."""
+"""How the kernels of the renderer and of the tyres are compiled: cached, and free of the interpreter's lock."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar

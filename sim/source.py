@@ -4,23 +4,27 @@ from collections import deque
 from collections.abc import Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from math import ceil, hypot, pi, remainder
+from math import hypot, pi, remainder
+from typing import NamedTuple
 
 import numpy as np
 
 from stereogrid.camera import StereoCamera
-from stereogrid.errors import InvalidInputError
+from stereogrid.errors import InvalidInputError, unknown_name
 from stereogrid.geometry import FloatArray, yaw_rad
 from stereogrid.observation import Image, Observation, Odometry, Truth
 
-from .follower import MAX_TURN_RADPS, PathFollower
-from .pioneer import TICK_S, Pioneer, SimulationError
-from .render import Renderer, View
+from .rendering.render import View
+from .rendering.renderers import RENDERERS, make_renderer
 from .rig import StereoRig
-from .scene import World
+from .robot.chassis import Chassis
+from .robot.follower import MAX_TURN_RADPS, PathFollower
+from .robot.headway import Headway
+from .robot.pioneer import TICK_S, Pioneer, SimulationError
+from .scene.scene import World
 
-PATIENCE_S = 6.0
-"""A robot that gains less than 2 cm of its path in this time is stuck."""
+TICKS_AFTER = 4
+"""A camera that is late sees what the robot does after the last observation."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +37,22 @@ class Moment:
     progress: float
 
 
+class Tick(NamedTuple):
+    """The robot's state at one tick of the physics: time [s], true pose (4, 4), turns (2,) of its wheels [rad]."""
+
+    stamp_s: float
+    T_world_base: FloatArray
+    wheels_rad: FloatArray
+
+
 @dataclass
 class Drive:
     """A Source: the drive through a world, from its first waypoint to its last.
 
     every_m, every_rad: a pair is taken when the robot has moved or turned by this much since the last one.
-    max_distance_m: stop earlier. workers: rendering threads; they change the speed and nothing else.
+    max_distance_m: stop earlier. payload_kg: on the robot's plate. renderer: a name in renderers.RENDERERS.
+    workers: rendering threads; they change the speed and nothing else.
+    ticks: how the robot moved in the drive under way, as far as it was simulated: ahead of the observations.
     """
 
     world: World
@@ -47,6 +61,8 @@ class Drive:
     every_rad: float = 0.13
     speed_mps: float = 0.4
     max_distance_m: float | None = None
+    payload_kg: float = 0.0
+    renderer: str = "raster"
     workers: int = 2
 
     def __post_init__(self) -> None:
@@ -58,27 +74,32 @@ class Drive:
         self.camera: StereoCamera = self.rig.camera
         self.T_base_cam: FloatArray = self.rig.T_base_cam
         self.progress = 0.0
+        self.ticks: list[Tick] = []
         PathFollower(self.world.waypoints_m, self.speed_mps)
-
-    @property
-    def most_observations(self) -> int:
-        """An upper estimate of how many observations the drive yields."""
-        length_m = min(self.max_distance_m or np.inf, self.world.path_length_m)
-        legs = np.diff(self.world.waypoints_m, axis=0)
-        turned_rad = float(np.abs(np.diff(np.unwrap(np.arctan2(legs[:, 1], legs[:, 0])))).sum())
-        return 2 + ceil(length_m / self.every_m) + ceil(1.3 * turned_rad / self.every_rad)
+        Chassis(payload_kg=self.payload_kg)
+        if self.renderer not in RENDERERS:
+            raise unknown_name("renderer", self.renderer, RENDERERS)
 
     def __iter__(self) -> Generator[Observation, None, None]:
-        renderer = Renderer(self.world)
+        renderer = make_renderer(self.renderer, self.world)
         with ThreadPoolExecutor(self.workers) as pool:
             waiting: deque[tuple[Moment, Future[tuple[View, Image]]]] = deque()
-            for moment in self.moments():
-                waiting.append((moment, pool.submit(self.rig.look, renderer, moment.T_world_base)))
-                # Enough ahead to keep every thread busy, few enough to hold little in memory.
-                if len(waiting) > self.workers + 1:
-                    yield self._observation(*waiting.popleft())
-            while waiting:
-                yield self._observation(*waiting.popleft())
+            try:
+                for moment in self.moments():
+                    look = pool.submit(self.rig.look, renderer, moment.T_world_base, time_s=moment.stamp_s)
+                    waiting.append((moment, look))
+                    # Enough ahead to keep every thread busy, few enough to hold little in memory.
+                    if len(waiting) > self.workers + 1:
+                        yield self._observation(*waiting.popleft())
+            except SimulationError:
+                # A drive that ends early still gives all that was seen up to there.
+                yield from self._all_of(waiting)
+                raise
+            yield from self._all_of(waiting)
+
+    def _all_of(self, waiting: deque[tuple[Moment, "Future[tuple[View, Image]]"]]) -> Iterator[Observation]:
+        while waiting:
+            yield self._observation(*waiting.popleft())
 
     def moments(self) -> Iterator[Moment]:
         """The physics alone: when and where the pictures are taken."""
@@ -86,16 +107,21 @@ class Drive:
         # Half a tick's motion less, so that a pair is taken at the tick nearest to where it is due.
         step_m = self.every_m - 0.5 * TICK_S * self.speed_mps
         step_rad = self.every_rad - 0.5 * TICK_S * MAX_TURN_RADPS
-        watch = _Watch()
-        with Pioneer(self.world) as robot:
+        headway = Headway()
+        with Pioneer(self.world, payload_kg=self.payload_kg) as robot:
+            self.ticks = [_tick(robot)]
             last = _moment(robot, follower)
             yield last
             while not follower.arrived:
                 robot.drive(*follower.command(robot.T_world_base, TICK_S))
-                watch.check(robot, follower)
+                self.ticks.append(_tick(robot))
+                headway.check(robot, follower)
                 if _has_moved(last.T_world_base, robot.T_world_base, step_m, step_rad):
                     last = _moment(robot, follower)
                     yield last
+            for _ in range(TICKS_AFTER):
+                robot.drive(*follower.command(robot.T_world_base, TICK_S))
+                self.ticks.append(_tick(robot))
 
     def _observation(self, moment: Moment, future: "Future[tuple[View, Image]]") -> Observation:
         left, right = future.result()
@@ -106,23 +132,15 @@ class Drive:
             right=right,
             odometry=moment.odometry,
             T_world_cam=moment.odometry.T_odom_base @ self.T_base_cam,
-            truth=Truth(moment.T_world_base @ self.T_base_cam, left.depth_m),
+            truth=Truth(moment.T_world_base @ self.T_base_cam, left.depth_m, self._movers(moment.stamp_s)),
         )
 
+    def _movers(self, time_s: float) -> dict[str, FloatArray]:
+        return {mover.name: self.world.T_world_mover(mover, time_s) for mover in self.world.movers}
 
-@dataclass
-class _Watch:
-    """Notices when the robot makes no headway."""
 
-    progress_m: float = 0.0
-    since_s: float = 0.0
-
-    def check(self, robot: Pioneer, follower: PathFollower) -> None:
-        if follower.progress_m > self.progress_m + 0.02:
-            self.progress_m, self.since_s = follower.progress_m, robot.time_s
-        elif robot.time_s - self.since_s > PATIENCE_S:
-            x, y = robot.T_world_base[:2, 3]
-            raise SimulationError(f"the robot is stuck at x = {x:.2f} m, y = {y:.2f} m after {robot.time_s:.1f} s")
+def _tick(robot: Pioneer) -> Tick:
+    return Tick(robot.time_s, robot.T_world_base, robot.encoders_rad())
 
 
 def _moment(robot: Pioneer, follower: PathFollower) -> Moment:

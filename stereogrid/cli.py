@@ -209,11 +209,28 @@ def run(command: typer.Typer, arguments: list[str] | None = None) -> int:
         what = error if isinstance(error, StereogridError) else f"not enough memory: {error}"
         print(f"error: {what}", file=sys.stderr)  # noqa: T201
         return 1
+    except SystemError as error:
+        if not was_interrupted(error):
+            raise
+        return _interrupted()
     except SystemExit as stop:  # how typer ends, well or not
         if stop.code == INTERRUPTED:
-            print("interrupted; earlier results are as they were", file=sys.stderr)  # noqa: T201
+            return _interrupted()
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
+
+
+def _interrupted() -> int:
+    print("interrupted; earlier results are as they were", file=sys.stderr)  # noqa: T201
+    return INTERRUPTED
+
+
+def was_interrupted(error: BaseException) -> bool:
+    """Whether an error arose from an interrupt: amid a kernel of Numba one comes out as a SystemError."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
 
 
 def main() -> None:

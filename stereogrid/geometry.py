@@ -91,5 +91,16 @@ def rotation_angle_rad(T: FloatArray) -> float:
     return float(Rotation.from_matrix(T[:3, :3]).magnitude())
 
 
+def look_at(eye_m: FloatArray, target_m: FloatArray) -> FloatArray:
+    """The pose (4, 4) of an optical frame (x right, y down, z forward) at eye_m that looks at target_m, z up."""
+    z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T[:3, 3] = eye_m
+    return T
+
+
 R_BASE_OPTICAL: FloatArray = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Axes of an optical frame (x right, y down, z forward) in a body frame (x forward, y left, z up)."""

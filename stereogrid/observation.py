@@ -1,8 +1,8 @@
 """What flows through the house: readings, disparities, and the protocols of those who make them."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -38,10 +38,14 @@ class Odometry:
 
 @dataclass(frozen=True)
 class Truth:
-    """What only a simulator or a reference instrument knows: T_world_cam (4, 4), depth_m (H, W) or None."""
+    """What only a simulator or a reference instrument knows: T_world_cam (4, 4), depth_m (H, W) or None.
+
+    movers: poses (4, 4) in world, by name, of the people and things that move; they are in no static mesh.
+    """
 
     T_world_cam: FloatArray
     depth_m: FloatImage | None = None
+    movers: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_cam", as_pose(self.T_world_cam, "true T_world_cam"))

@@ -32,7 +32,7 @@ def main(uv: str) -> None:
         python = folder / "env" / "bin" / "python"
         wheel = next((folder / "dist").glob("*.whl"))
         call(uv, "pip", "install", "--quiet", "--python", python, wheel)
-        for absent in ("pybullet", "sim", "experiments", "embreex"):
+        for absent in ("pybullet", "sim", "arcos", "experiments", "embreex"):
             if call(python, "-c", f"import {absent}", cwd=folder, may_fail=True) == 0:
                 sys.exit(f"the wheel's environment must not hold {absent}")
         call(folder / "env" / "bin" / "stereogrid", "map", "wall.mcap", "--out", "wall.sgrid", cwd=folder)

@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
-from ..geometry import Array, FloatArray, inverse, transform
+from ..geometry import Array, FloatArray, inverse, look_at, transform
 from ..grid import OccupancyGrid
 
 FACE_NORMALS: Array = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
@@ -67,17 +67,6 @@ def eye_behind(T_world_cam: FloatArray, back_m: float, up_m: float) -> FloatArra
     forward /= np.linalg.norm(forward)
     at = T_world_cam[:3, 3] - back_m * forward + [0, 0, up_m]
     return look_at(at, T_world_cam[:3, 3] + 0.5 * back_m * forward)
-
-
-def look_at(eye_m: FloatArray, target_m: FloatArray) -> FloatArray:
-    """The pose (4, 4) of an optical frame (x right, y down, z forward) at eye_m that looks at target_m, z up."""
-    z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
-    x = np.cross(z, [0.0, 0.0, 1.0])
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    T[:3, 3] = eye_m
-    return T
 
 
 def frustum_lines_m(camera: StereoCamera, T_world_cam: FloatArray, depth_m: float = 0.8) -> FloatArray:

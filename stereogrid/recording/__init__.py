@@ -9,19 +9,24 @@ from ..observation import Recording
 from .kitti import KittiRecording, is_kitti
 from .mcap import McapRecording, McapWriter
 from .mcap_scan import is_mcap
-from .views import ShuffledPoses, Subset, TruePoses, poses
+from .ticks import KnowsMotion, Ticks
+from .views import ShuffledPoses, Subset, TruePoses, TrueTilt, poses, stamps_s
 
 __all__ = [
     "RECORDINGS",
     "KittiRecording",
+    "KnowsMotion",
     "McapRecording",
     "McapWriter",
     "RecordingKind",
     "ShuffledPoses",
     "Subset",
+    "Ticks",
     "TruePoses",
+    "TrueTilt",
     "open_recording",
     "poses",
+    "stamps_s",
 ]
 
 

@@ -1,6 +1,7 @@
 """Recordings as MCAP files of ROS 2 messages, which Foxglove and `ros2 bag` open too."""
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from ..observation import Image, Observation, Truth
 from . import ros2_messages as ros2
 from .images import decode_grey, png_size
 from .mcap_scan import ClippedFile, Contents, scan
-from .mcap_writer import FORMAT_VERSION, MESH_NAME, METADATA_NAME, McapWriter
+from .mcap_writer import FORMAT_VERSION, MESH_NAME, METADATA_NAME, NOTE_NAME, McapWriter, mover_mesh_name
+from .ticks import Ticks
 from .track import odometry_track
 
 __all__ = ["McapRecording", "McapWriter"]
@@ -41,7 +43,7 @@ class McapRecording:
         contents = scan(self.path)
         self._contents = contents
         self.damage = contents.damage
-        self.metadata = dict(contents.metadata.get(METADATA_NAME, {}))
+        self.metadata = {**contents.metadata.get(METADATA_NAME, {}), **contents.metadata.get(NOTE_NAME, {})}
         try:
             self._stamps_ns = _whole_observations(contents, self.metadata)
             self.camera = ros2.read_camera(_first(contents, ros2.LEFT_INFO), _first(contents, ros2.RIGHT_INFO))
@@ -51,6 +53,7 @@ class McapRecording:
             self._truth = {stamp: self._pose(ros2.TRUE_POSE, stamp) for stamp in true_stamps}
         except InvalidInputError as error:
             raise RecordingError(f"{self.path}: {error}" + (f" ({self.damage})" if self.damage else "")) from error
+        self.stamps_s: FloatArray = np.array([stamp_ns / 10**9 for stamp_ns in self._stamps_ns])
         self.poses: FloatArray = np.stack([each.T_odom_base @ self.T_base_cam for each in self._odometry])
 
     @property
@@ -77,7 +80,10 @@ class McapRecording:
 
     def truth_mesh_ply(self) -> bytes | None:
         """The PLY file of the true world's mesh, or None when the recording carries none."""
-        offset = self._contents.attachments.get(MESH_NAME)
+        return self._attachment(MESH_NAME)
+
+    def _attachment(self, name: str) -> bytes | None:
+        offset = self._contents.attachments.get(name)
         if offset is None:
             return None
         with ClippedFile(self.path) as file:
@@ -86,17 +92,43 @@ class McapRecording:
             raise RecordingError(f"{self.path}: changed since it was opened")
         return record.data
 
+    def ticks(self) -> Ticks | None:
+        """The robot's true motion between the observations, as the simulator wrote it; None when it did not."""
+        topics = (ros2.TRUE_BASE, ros2.WHEELS)
+        places = [self._contents.messages.get(topic, {}) for topic in topics]
+        stamps_ns = sorted(places[0].keys() & places[1].keys())
+        if not stamps_ns:
+            return None
+        poses, turns = [], []
+        with ClippedFile(self.path) as file:
+            for stamp_ns in stamps_ns:
+                with self._naming(f"the tick at {stamp_ns / 10**9:.9f} s"):
+                    base, wheels = (self._message(topic, stamp_ns, file.records_at) for topic in topics)
+                    poses.append(ros2.read_pose(base.pose, ros2.TRUE_BASE))
+                    turns.append(ros2.read_wheels(wheels))
+        return Ticks(np.array([stamp_ns / 10**9 for stamp_ns in stamps_ns]), np.array(poses), np.array(turns))
+
+    def mover_mesh_ply(self, name: str) -> bytes | None:
+        """The PLY file of a mover's mesh in its own frame, or None when the recording carries none of that name."""
+        return self._attachment(mover_mesh_name(name))
+
     def _observation(self, number: int, records_at: _RecordsAt) -> Observation:
         stamp_ns = self._stamps_ns[number]
-        try:
+        with self._naming(f"the observation at {stamp_ns / 10**9:.9f} s"):
             left, right = (self._image(topic, stamp_ns, records_at) for topic in (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE))
             truth = self._read_truth(stamp_ns, records_at)
             odometry = self._odometry[number]
             return Observation(stamp_ns / 10**9, left, right, odometry, self.poses[number], truth)
+
+    @contextmanager
+    def _naming(self, what: str) -> Iterator[None]:
+        """Turn whatever goes wrong into a RecordingError that names the file and what was read."""
+        try:
+            yield
         except Exception as error:
             # The mcap library raises whatever its parsers stumble on.
-            what = str(error) if isinstance(error, StereogridError) else f"cannot be decoded: {error!r}"
-            raise RecordingError(f"{self.path}: the observation at {stamp_ns / 10**9:.9f} s: {what}") from error
+            fault = str(error) if isinstance(error, StereogridError) else f"cannot be decoded: {error!r}"
+            raise RecordingError(f"{self.path}: {what}: {fault}") from error
 
     def _read_truth(self, stamp_ns: int, records_at: _RecordsAt) -> Truth | None:
         if stamp_ns not in self._truth:
@@ -105,7 +137,10 @@ class McapRecording:
         if stamp_ns in self._contents.messages.get(ros2.TRUE_DEPTH, {}):
             depth_m = ros2.read_depth(self._message(ros2.TRUE_DEPTH, stamp_ns, records_at))
             self._check_size(ros2.TRUE_DEPTH, depth_m.shape)
-        return Truth(self._truth[stamp_ns], depth_m)
+        movers = {}
+        if stamp_ns in self._contents.messages.get(ros2.TRUE_MOVERS, {}):
+            movers = ros2.read_movers(self._message(ros2.TRUE_MOVERS, stamp_ns, records_at))
+        return Truth(self._truth[stamp_ns], depth_m, movers)
 
     def _image(self, topic: str, stamp_ns: int, records_at: _RecordsAt) -> Image:
         encoded = self._message(topic, stamp_ns, records_at).data

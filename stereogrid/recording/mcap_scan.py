@@ -108,7 +108,13 @@ class _Scanner:
             # It has no header of its own.
             self.contents.static_transforms.extend(self._decoders[topic](data).transforms)
             return
-        stamp_ns = ros2.header_stamp_ns(self._stamp(data))
+        if topic == ros2.TRUE_MOVERS:
+            transforms = ros2.decoder(ros2.TOPICS[topic])(data).transforms
+            if not transforms:
+                return
+            stamp_ns = ros2.header_stamp_ns(transforms[0].header)
+        else:
+            stamp_ns = ros2.header_stamp_ns(self._stamp(data))
         if topic in self._decoders:
             self.contents.small.setdefault(topic, {}).setdefault(stamp_ns, self._decoders[topic](data))
         self.contents.messages.setdefault(topic, {}).setdefault(stamp_ns, location)

@@ -18,6 +18,7 @@ from .ros2_schemas import SCHEMAS
 
 FORMAT_VERSION = "1"
 METADATA_NAME = "stereogrid"
+NOTE_NAME = "stereogrid/note"
 MESH_NAME = "truth_mesh.ply"
 
 
@@ -29,7 +30,8 @@ class McapWriter:
     the same observations give the same bytes. An observation's pose is written as its odometry;
     T_world_cam is not, since a reader makes it from T_odom_base @ T_base_cam.
 
-    metadata: text kept in the file. truth_mesh_ply: the bytes of the true world's mesh.
+    metadata: text kept in the file. truth_mesh_ply: the bytes of the true world's mesh; mover_meshes_ply: of what
+    moves in it, by name, each in its own frame.
     Raises RecordingError when the file exists (unless overwrite) or cannot be written, InvalidInputError
     when an argument is wrong.
     """
@@ -42,13 +44,16 @@ class McapWriter:
         *,
         metadata: Mapping[str, str] | None = None,
         truth_mesh_ply: bytes | None = None,
+        mover_meshes_ply: Mapping[str, bytes] | None = None,
         overwrite: bool = False,
     ) -> None:
         self.path = Path(path)
         self.camera = camera
         self.T_base_cam = as_pose(T_base_cam, "T_base_cam")
-        checked = _checked_metadata(metadata or {})
+        own = {"format_version": FORMAT_VERSION, "stereogrid_version": _library_version()}
+        checked = _checked_metadata(metadata or {}, own)
         self._last_stamp_ns: int | None = None
+        self._last_tick_ns: int | None = None
         self._file = self._open("wb" if overwrite else "xb")
         with self._reporting():
             # A limit of zero bytes closes a chunk after every message.
@@ -59,6 +64,28 @@ class McapWriter:
             self._mcap.add_metadata(METADATA_NAME, checked)
             if truth_mesh_ply is not None:
                 self._mcap.add_attachment(0, 0, MESH_NAME, "model/ply", truth_mesh_ply)
+            for name, mesh_ply in (mover_meshes_ply or {}).items():
+                self._mcap.add_attachment(0, 0, mover_mesh_name(name), "model/ply", mesh_ply)
+            self._file.flush()
+
+    def write_tick(self, stamp_s: float, T_world_base: FloatArray, wheels_rad: FloatArray) -> None:
+        """Append the robot's true pose (4, 4) and the turns (2,) of its wheels [rad] at a time between observations.
+
+        Ticks come in the order of their stamps, best before the observation that they lead to.
+        Raises InvalidInputError when the stamp does not increase, RecordingError when the file cannot be written.
+        """
+        stamp_ns = ros2.stamp_to_ns(stamp_s)
+        if self._last_tick_ns is not None and stamp_ns <= self._last_tick_ns:
+            raise InvalidInputError(f"ticks' stamps must increase: {stamp_s} s follows {self._last_tick_ns / 1e9} s")
+        with self._reporting():
+            self._message(ros2.TRUE_BASE, stamp_ns, ros2.true_pose_message(stamp_ns, T_world_base))
+            self._message(ros2.WHEELS, stamp_ns, ros2.wheels_message(stamp_ns, wheels_rad))
+        self._last_tick_ns = stamp_ns
+
+    def write_note(self, key: str, text: str) -> None:
+        """Add to the metadata what became known while recording, such as why it ended; one note a recording."""
+        with self._reporting():
+            self._mcap.add_metadata(NOTE_NAME, _checked_metadata({key: text}, own={}))
             self._file.flush()
 
     def write(self, observation: Observation) -> None:
@@ -98,6 +125,8 @@ class McapWriter:
         truth = observation.truth
         if truth is not None:
             yield ros2.TRUE_POSE, ros2.true_pose_message(stamp_ns, truth.T_world_cam)
+            if truth.movers:
+                yield ros2.TRUE_MOVERS, ros2.movers_message(stamp_ns, truth.movers)
             if truth.depth_m is not None:
                 yield ros2.TRUE_DEPTH, ros2.depth_message(stamp_ns, truth.depth_m)
         yield ros2.LEFT_IMAGE, ros2.image_message(stamp_ns, observation.left)
@@ -138,8 +167,12 @@ class McapWriter:
             raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
 
 
-def _checked_metadata(metadata: Mapping[str, str]) -> dict[str, str]:
-    own = {"format_version": FORMAT_VERSION, "stereogrid_version": _library_version()}
+def mover_mesh_name(name: str) -> str:
+    """What the mesh of a mover is called among the file's attachments."""
+    return f"mover/{name}.ply"
+
+
+def _checked_metadata(metadata: Mapping[str, str], own: dict[str, str]) -> dict[str, str]:
     for key, value in metadata.items():
         if not isinstance(key, str) or not isinstance(value, str):
             raise InvalidInputError(f"metadata must be text: {key!r} is {value!r}")

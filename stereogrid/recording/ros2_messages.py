@@ -1,6 +1,6 @@
 """Poses, cameras and images as ROS 2 messages: built as dicts, read from what mcap_ros2 decodes."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
@@ -26,6 +26,9 @@ ODOMETRY = "/odom"
 TF_STATIC = "/tf_static"
 TRUE_POSE = "/truth/pose"
 TRUE_DEPTH = "/truth/depth"
+TRUE_BASE = "/truth/base"
+TRUE_MOVERS = "/truth/movers"
+WHEELS = "/wheels"
 
 TOPICS = {
     TF_STATIC: "tf2_msgs/msg/TFMessage",
@@ -33,12 +36,16 @@ TOPICS = {
     RIGHT_INFO: "sensor_msgs/msg/CameraInfo",
     ODOMETRY: "nav_msgs/msg/Odometry",
     TRUE_POSE: "geometry_msgs/msg/PoseStamped",
+    TRUE_BASE: "geometry_msgs/msg/PoseStamped",
+    TRUE_MOVERS: "tf2_msgs/msg/TFMessage",
+    WHEELS: "sensor_msgs/msg/JointState",
     TRUE_DEPTH: "sensor_msgs/msg/Image",
     LEFT_IMAGE: "sensor_msgs/msg/CompressedImage",
     RIGHT_IMAGE: "sensor_msgs/msg/CompressedImage",
 }
 """Message type of each topic, in the order in which an observation is written."""
 
+WHEEL_NAMES = ["left_wheels", "right_wheels"]
 CAMERA_FRAME = "left_camera_optical"
 BASE_FRAME = "base_link"
 
@@ -90,16 +97,29 @@ def odometry_message(stamp_ns: int, T_odom_base: FloatArray) -> Message:
     }
 
 
-def true_pose_message(stamp_ns: int, T_world_cam: FloatArray) -> Message:
-    """geometry_msgs/PoseStamped of the left camera in the frame `world`."""
-    return {"header": header(stamp_ns, "world"), "pose": pose_message(T_world_cam)}
+def true_pose_message(stamp_ns: int, T_world_frame: FloatArray) -> Message:
+    """geometry_msgs/PoseStamped of the left camera, or of the robot's base, in the frame `world`."""
+    return {"header": header(stamp_ns, "world"), "pose": pose_message(T_world_frame)}
+
+
+def wheels_message(stamp_ns: int, wheels_rad: FloatArray) -> Message:
+    """sensor_msgs/JointState of the turns (2,) of the left and the right wheels [rad]."""
+    return {"header": header(stamp_ns, BASE_FRAME), "name": WHEEL_NAMES, "position": wheels_rad.tolist()}
 
 
 def static_transform_message(stamp_ns: int, T_base_cam: FloatArray) -> Message:
     """tf2_msgs/TFMessage with the one transform base_link -> left_camera_optical."""
-    transform = {"translation": _vector(T_base_cam[:3, 3]), "rotation": _quaternion(T_base_cam)}
-    stamped = {"header": header(stamp_ns, BASE_FRAME), "child_frame_id": CAMERA_FRAME, "transform": transform}
-    return {"transforms": [stamped]}
+    return {"transforms": [_stamped_transform(stamp_ns, (BASE_FRAME, CAMERA_FRAME), T_base_cam)]}
+
+
+def movers_message(stamp_ns: int, movers: Mapping[str, FloatArray]) -> Message:
+    """tf2_msgs/TFMessage of the true poses (4, 4) of what moves, by name, in the frame `world`."""
+    return {"transforms": [_stamped_transform(stamp_ns, ("world", name), T) for name, T in movers.items()]}
+
+
+def _stamped_transform(stamp_ns: int, frames: tuple[str, str], T_parent_child: FloatArray) -> Message:
+    transform = {"translation": _vector(T_parent_child[:3, 3]), "rotation": _quaternion(T_parent_child)}
+    return {"header": header(stamp_ns, frames[0]), "child_frame_id": frames[1], "transform": transform}
 
 
 def camera_info_message(stamp_ns: int, camera: StereoCamera, *, right: bool) -> Message:
@@ -175,6 +195,26 @@ def read_static_transform(transforms: Iterable[Any]) -> FloatArray:
         if (stamped.header.frame_id, stamped.child_frame_id) == (BASE_FRAME, CAMERA_FRAME):
             return read_transform(stamped.transform.translation, stamped.transform.rotation, "T_base_cam")
     raise InvalidInputError(f"{TF_STATIC} holds no transform {BASE_FRAME} -> {CAMERA_FRAME}")
+
+
+def read_movers(message: Any) -> dict[str, FloatArray]:
+    """Poses (4, 4) by name of a decoded tf2_msgs/TFMessage. Raises InvalidInputError on a wrong one."""
+    return {
+        stamped.child_frame_id: read_transform(
+            stamped.transform.translation, stamped.transform.rotation, stamped.child_frame_id
+        )
+        for stamped in message.transforms
+    }
+
+
+def read_wheels(message: Any) -> FloatArray:
+    """Turns (2,) of the wheels [rad] of a decoded sensor_msgs/JointState. Raises InvalidInputError on other joints."""
+    if list(message.name) != WHEEL_NAMES or len(message.position) != len(WHEEL_NAMES):
+        raise InvalidInputError(f"{WHEELS} must hold {' and '.join(WHEEL_NAMES)}, not {list(message.name)}")
+    turns: FloatArray = np.array(message.position, dtype=np.float64)
+    if not np.isfinite(turns).all():
+        raise InvalidInputError(f"{WHEELS} contains NaN or infinity")
+    return turns
 
 
 def read_camera(left_info: Any, right_info: Any) -> StereoCamera:

@@ -55,6 +55,9 @@ SCHEMAS = {
         "geometry_msgs/Twist",
         "geometry_msgs/Vector3",
     ),
+    "sensor_msgs/msg/JointState": _schema(
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort", *_STAMPED
+    ),
     "geometry_msgs/msg/PoseStamped": _schema("std_msgs/Header header\nPose pose", *_STAMPED, *_POSE),
     "tf2_msgs/msg/TFMessage": _schema(
         "geometry_msgs/TransformStamped[] transforms",

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from ..errors import InvalidInputError, RecordingError
-from ..geometry import FloatArray, from_yaw, inverse
+from ..geometry import FloatArray, from_yaw, inverse, yaw_rad
 from ..observation import Observation, Recording
 
 
@@ -22,6 +22,18 @@ def poses(recording: Recording) -> FloatArray:
     if isinstance(recording, _KnowsPoses):
         return recording.poses
     return np.array([each.T_world_cam for each in recording]).reshape(-1, 4, 4)
+
+
+@runtime_checkable
+class _KnowsStamps(Protocol):
+    stamps_s: FloatArray
+
+
+def stamps_s(recording: Recording) -> FloatArray:
+    """The stamps (M,) of all observations [s], without decoding images where that can be."""
+    if isinstance(recording, _KnowsStamps):
+        return recording.stamps_s
+    return np.array([each.stamp_s for each in recording], dtype=float)
 
 
 class TruePoses:
@@ -45,6 +57,32 @@ class TruePoses:
             if each.truth is None:
                 raise RecordingError(f"the observation at {each.stamp_s} s carries no true pose")
             yield _with_pose(each, each.truth.T_world_cam, self.T_base_cam)
+
+
+class TrueTilt:
+    """A recording that claims its own x, y and heading, and the true height, roll and pitch.
+
+    As a robot on uneven ground with an inclinometer: wheels alone know of no slope. Raises RecordingError when an
+    observation carries no truth; the first one is tried at once.
+    """
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self.camera = recording.camera
+        self.T_base_cam = recording.T_base_cam
+        next(iter(self), None)
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[Observation]:
+        for each in self._recording:
+            if each.truth is None:
+                raise RecordingError(f"the observation at {each.stamp_s} s carries no true tilt")
+            claimed, true = (T @ inverse(self.T_base_cam) for T in (each.T_world_cam, each.truth.T_world_cam))
+            tilted = from_yaw(yaw_rad(claimed) - yaw_rad(true)) @ true
+            tilted[:3, 3] = [*claimed[:2, 3], true[2, 3]]
+            yield _with_pose(each, tilted @ self.T_base_cam, self.T_base_cam)
 
 
 class Subset:

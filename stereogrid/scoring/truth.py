@@ -2,7 +2,7 @@
 
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
@@ -11,6 +11,7 @@ from ..camera import StereoCamera
 from ..errors import InvalidInputError, RecordingError
 from ..geometry import FloatArray
 from .calibration import ReliabilityTable
+from .heights import ground_height_m
 from .labels import CellLabels, label_cells
 from .map_scores import SIGMA_PX, ScoredMap, map_reliability, score_map
 from .score import Score
@@ -75,6 +76,21 @@ class MapTruth:
         labels = CellLabels(self.labels.cell_m, origin, self.labels.label[:, :, layers])
         visible = VisibleSet(self.visible.nearest_m[:, :, layers], self.visible.in_view[:, :, layers])
         return MapTruth(self.mesh, self.camera, labels, visible)
+
+    def above_ground(self, low_m: float, high_m: float) -> "MapTruth":
+        """The same truth restricted to the cells with centres from low_m to high_m above the ground below them [m].
+
+        The ground is the lowest surface that faces upwards; cells over none are left out.
+        """
+        ground_m = ground_height_m(self.mesh, self.labels)
+        if not np.isfinite(ground_m).any():
+            raise InvalidInputError("the true mesh has no ground: no surface of it faces upwards")
+        part = self.between(float(np.nanmin(ground_m)) + low_m, float(np.nanmax(ground_m)) + high_m)
+        z_m = (part.labels.origin_index[2] + np.arange(part.labels.label.shape[2]) + 0.5) * part.labels.cell_m
+        height_m = z_m - ground_m[..., None]
+        kept = (height_m >= low_m) & (height_m <= high_m)
+        nearest_m = np.where(kept, part.visible.nearest_m, np.float32(np.inf))
+        return replace(part, visible=VisibleSet(nearest_m, part.visible.in_view & kept))
 
     def score(
         self, grid: ScoredMap, *, prior: float = 0.5, sigma_px: float = SIGMA_PX, surface: bool = True

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+import typer
 
 from stereogrid import cli, mapping_run
 from stereogrid.camera import StereoCamera
@@ -553,3 +554,20 @@ def test_the_road_of_a_real_street_lies_as_far_under_the_camera_as_it_was_mounte
     metrics = json.loads(Path("runs/latest/metrics.json").read_text())
     assert metrics["scores"]["camera_height_m"]["value"] == pytest.approx(1.65, abs=0.04)
     assert float(numbers_of(capsys.readouterr().out)["camera_height_m"]) == pytest.approx(1.65, abs=0.04)
+
+
+@pytest.mark.parametrize(("cause", "ending"), [(KeyboardInterrupt(), 130), (ValueError("a bug"), None)])
+def test_an_interrupt_amid_a_compiled_kernel_is_an_interrupt_and_a_bug_stays_a_bug(cause, ending, capsys):
+    app = typer.Typer(pretty_exceptions_enable=False)
+
+    @app.command()
+    def work() -> None:
+        """As Numba reports what arrives while it loads arguments."""
+        raise SystemError("returned a result with an exception set") from cause
+
+    if ending is None:
+        with pytest.raises(SystemError):
+            cli.run(app, [])
+    else:
+        assert cli.run(app, []) == ending
+        assert capsys.readouterr().err == "interrupted; earlier results are as they were\n"

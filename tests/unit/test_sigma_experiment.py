@@ -13,7 +13,7 @@ from scipy.optimize import check_grad
 import experiments.sigma
 from experiments.sigma import Row, coverage_figure, fit_and_test, write_tables
 from experiments.sigma_fit import Coverage, Sample, _loss, coverage, fit, hats
-from experiments.sigma_scenes import PLANES_NOISE, Scene, draw_planes, plane_scenes
+from experiments.sigma_scenes import PLANES_FAULTS, Scene, draw_planes, plane_scenes
 from stereogrid.matching.sigma import KNOTS, SMALLEST_PX, SigmaTable, rows, sigma_tables
 from stereogrid.matching.sigma_cues import CUES
 
@@ -141,9 +141,9 @@ def test_drawn_planes_show_in_the_right_image_what_their_disparity_says(seed):
 
 def test_the_same_planes_are_seen_with_every_noise():
     seen = list(plane_scenes(seed=3))
-    assert len({each.row for each in seen}) == len(PLANES_NOISE)
+    assert len({each.row for each in seen}) == len(PLANES_FAULTS)
     np.testing.assert_array_equal(seen[0].truth_px, seen[1].truth_px)
-    assert np.abs(seen[0].left.astype(int) - seen[len(PLANES_NOISE) - 1].left).mean() > 1
+    assert np.abs(seen[0].left.astype(int) - seen[len(PLANES_FAULTS) - 1].left).mean() > 1
 
 
 @contextmanager

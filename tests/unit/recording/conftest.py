@@ -26,7 +26,8 @@ def make_observations(n: int, *, truth: bool = True, start_s: float = 1_700_000_
         true_pose = from_yaw(0.02, [0, 0.1, 0]) @ T_world_cam
         depth_m = rng.uniform(0.5, 9, CAMERA.shape).astype(np.float32)
         depth_m[:4] = np.nan
-        known = Truth(true_pose, depth_m) if truth else None
+        movers = {"walker": from_yaw(0.3 * i, [i, 1, 0]), "trolley": from_yaw(0.0, [0, i, 0])}
+        known = Truth(true_pose, depth_m, movers) if truth else None
         made.append(Observation(start_s + i / 7, left, right, Odometry(T_odom_base), T_world_cam, known))
     return made
 
@@ -34,8 +35,19 @@ def make_observations(n: int, *, truth: bool = True, start_s: float = 1_700_000_
 def write_mcap(path: Path, observations: list[Observation], **options: object) -> Path:
     with McapWriter(path, CAMERA, T_BASE_CAM, **options) as writer:  # type: ignore[arg-type]
         for each in observations:
+            for tick in ticks_of(each):
+                writer.write_tick(*tick)
             writer.write(each)
     return path
+
+
+def ticks_of(observation: Observation) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """Three ticks up to an observation with a truth: as a simulator has them."""
+    if observation.truth is None:
+        return []
+    T = observation.truth.T_world_cam
+    stamps_s = observation.stamp_s - np.array([0.1, 0.05, 0.0])
+    return [(float(stamp_s), T, np.array([1.0, 2.0]) * k) for k, stamp_s in enumerate(stamps_s)]
 
 
 def write_kitti(folder: Path, n: int = 4, names: tuple[str, str] = ("image_0", "image_1")) -> Path:
@@ -64,6 +76,7 @@ def synthetic() -> SimpleNamespace:
         T_base_cam=T_BASE_CAM,
         observations=make_observations,
         write_mcap=write_mcap,
+        ticks_of=ticks_of,
         write_kitti=write_kitti,
         row=row,
     )

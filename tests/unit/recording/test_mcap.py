@@ -29,6 +29,45 @@ def test_what_is_written_is_read_back_exactly(tmp_path: Path, synthetic: SimpleN
         assert before.stamp_s == after.stamp_s
 
 
+def test_what_moves_is_read_back_with_its_name_and_mesh(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    written = synthetic.observations(3)
+    recording = McapRecording(
+        synthetic.write_mcap(tmp_path / "a.mcap", written, mover_meshes_ply={"walker": b"ply\n\x00"})
+    )
+    for before, after in zip(written, recording, strict=True):
+        assert list(after.truth.movers) == ["walker", "trolley"]
+        for name, T_world_mover in before.truth.movers.items():
+            np.testing.assert_allclose(after.truth.movers[name], T_world_mover, atol=1e-12)
+    assert recording.mover_mesh_ply("walker") == b"ply\n\x00" and recording.mover_mesh_ply("trolley") is None
+
+
+def test_ticks_are_read_back_and_are_no_observations(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    written = synthetic.observations(4)
+    recording = McapRecording(synthetic.write_mcap(tmp_path / "a.mcap", written))
+    expected = [tick for each in written for tick in synthetic.ticks_of(each)]
+    ticks = recording.ticks()
+    assert len(recording) == 4 and ticks is not None and len(ticks) == len(expected)
+    for k, (stamp_s, T_world_base, wheels_rad) in enumerate(expected):
+        assert ticks.stamp_s[k] == pytest.approx(stamp_s, abs=1e-9)
+        np.testing.assert_allclose(ticks.T_world_base[k], T_world_base, atol=1e-12)
+        np.testing.assert_array_equal(ticks.wheels_rad[k], wheels_rad)
+
+
+def test_a_recording_without_ticks_says_so(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    assert (
+        McapRecording(synthetic.write_mcap(tmp_path / "a.mcap", synthetic.observations(2, truth=False))).ticks() is None
+    )
+
+
+def test_ticks_must_come_in_order(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    with (
+        pytest.raises(InvalidInputError, match="ticks' stamps must increase"),
+        McapWriter(tmp_path / "a.mcap", synthetic.camera, synthetic.T_base_cam) as writer,
+    ):
+        for stamp_s in (1.0, 0.5):
+            writer.write_tick(stamp_s, np.eye(4), np.zeros(2))
+
+
 def test_the_same_observations_give_the_same_bytes(tmp_path: Path, synthetic: SimpleNamespace) -> None:
     files = [synthetic.write_mcap(tmp_path / name, synthetic.observations(3), metadata={"k": "v"}) for name in "ab"]
     assert files[0].read_bytes() == files[1].read_bytes()
@@ -69,7 +108,7 @@ def test_rosbags_reads_every_message(mcap_file: Path, synthetic: SimpleNamespace
     with AnyReader([mcap_file]) as bag:
         messages = [(c.topic, bag.deserialize(raw, c.msgtype)) for c, _, raw in bag.messages()]
         assert {c.topic: c.msgtype for c in bag.connections} == TOPICS
-    assert len(messages) == 5 * 7 + 1
+    assert len(messages) == 5 * (8 + 3 * 2) + 1
     P_right = next(m for topic, m in messages if topic == "/right/camera_info").p
     assert P_right[3] == pytest.approx(-40 * 0.06)
     depth = next(m for topic, m in messages if topic == "/truth/depth")
@@ -81,12 +120,17 @@ def test_the_ros2_reader_of_mcap_reads_every_message(mcap_file: Path) -> None:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         messages = [(channel.topic, record, message) for _, channel, record, message in reader.iter_decoded_messages()]
     assert {topic for topic, _, _ in messages} == set(TOPICS)
+    movers = next(message for topic, _, message in messages if topic == "/truth/movers").transforms
+    assert [(each.header.frame_id, each.child_frame_id) for each in movers] == [
+        ("world", "walker"),
+        ("world", "trolley"),
+    ]
     (tf,) = [message for topic, _, message in messages if topic == "/tf_static"]
     frames = tf.transforms[0].header.frame_id, tf.transforms[0].child_frame_id
     assert frames == ("base_link", "left_camera_optical")
     for topic, record, message in messages:
         assert record.log_time == record.publish_time
-        if topic != "/tf_static":
+        if topic not in ("/tf_static", "/truth/movers"):
             assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == record.log_time
 
 
@@ -142,3 +186,11 @@ def test_metadata_must_be_text_and_not_ours(
     with pytest.raises(InvalidInputError, match="metadata"):
         synthetic.write_mcap(tmp_path / "a.mcap", [], metadata=metadata)
     assert not (tmp_path / "a.mcap").exists()
+
+
+def test_a_note_made_while_recording_is_in_the_metadata(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    with McapWriter(tmp_path / "a.mcap", synthetic.camera, synthetic.T_base_cam, metadata={"world": "x"}) as writer:
+        writer.write(synthetic.observations(1)[0])
+        writer.write_note("ended early", "the robot is stuck")
+    metadata = McapRecording(tmp_path / "a.mcap").metadata
+    assert metadata["world"] == "x" and metadata["ended early"] == "the robot is stuck"

@@ -1,13 +1,18 @@
 """Views change what they say they change, and nothing else."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from stereogrid.errors import InvalidInputError, RecordingError
-from stereogrid.recording import KittiRecording, McapRecording, ShuffledPoses, Subset, TruePoses, poses
+from stereogrid.geometry import from_rotation, inverse, yaw_rad
+from stereogrid.observation import Observation, Truth
+from stereogrid.recording import KittiRecording, McapRecording, ShuffledPoses, Subset, TruePoses, TrueTilt, poses
 
 
 def test_true_poses_replace_the_claimed_ones(mcap_file: Path) -> None:
@@ -19,6 +24,43 @@ def test_true_poses_replace_the_claimed_ones(mcap_file: Path) -> None:
 def test_true_poses_need_truth(kitti_folder: Path) -> None:
     with pytest.raises(RecordingError, match=r"observation at 0\.0 s carries no true pose"):
         TruePoses(KittiRecording(kitti_folder))
+
+
+class Hilly:
+    """A recording whose robot truly climbs, leans and veers, and does not know it."""
+
+    def __init__(self, recording: McapRecording) -> None:
+        self._recording, self.camera, self.T_base_cam = recording, recording.camera, recording.T_base_cam
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __iter__(self) -> Iterator[Observation]:
+        for n, each in enumerate(self._recording):
+            tilt = from_rotation(Rotation.from_euler("ZYX", [0.3, -0.1 * n, 0.05]).as_matrix(), [0.2, 0.1, 0.1 * n])
+            assert each.truth is not None
+            yield replace(each, truth=Truth(tilt @ each.truth.T_world_cam))
+
+
+def test_a_known_tilt_changes_height_roll_and_pitch_and_leaves_the_rest(mcap_file: Path) -> None:
+    recording = Hilly(McapRecording(mcap_file))
+    tilted = TrueTilt(recording)
+    base_cam = inverse(recording.T_base_cam)
+    for claimed, found in zip(recording, tilted, strict=True):
+        assert claimed.truth is not None
+        before, now, truth = (T @ base_cam for T in (claimed.T_world_cam, found.T_world_cam, claimed.truth.T_world_cam))
+        np.testing.assert_allclose(now[:2, 3], before[:2, 3], atol=1e-12)
+        assert np.isclose(yaw_rad(now), yaw_rad(before))
+        # Where z points, seen from the robot's heading, is where it truly points.
+        np.testing.assert_allclose(now[2], truth[2], atol=1e-12)
+        np.testing.assert_allclose(found.odometry.T_odom_base, now, atol=1e-12)
+        np.testing.assert_array_equal(found.left, claimed.left)
+    assert not np.allclose(poses(tilted), poses(recording))
+
+
+def test_a_known_tilt_needs_truth(kitti_folder: Path) -> None:
+    with pytest.raises(RecordingError, match=r"observation at 0\.0 s carries no true tilt"):
+        TrueTilt(KittiRecording(kitti_folder))
 
 
 @pytest.mark.parametrize(

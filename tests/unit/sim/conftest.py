@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sim.scene import World
-from sim.world import make_world
+from sim.scene.scene import World
+from sim.worlds.world import make_world
 
 if TYPE_CHECKING:
-    from sim.render import Renderer
+    from sim.rendering.render import Renderer
 
 
 @pytest.fixture(scope="session")
@@ -18,6 +18,6 @@ def corridor() -> World:
 
 @pytest.fixture(scope="session")
 def renderer(corridor: World) -> "Renderer":
-    from sim.render import Renderer
+    from sim.rendering.render import Renderer
 
     return Renderer(corridor)

@@ -40,6 +40,15 @@ def test_record_writes_a_recording(tmp_path: Path) -> None:
         (("maze", "--out", "{out}"), "no world named 'maze'; choose from: corridor"),
         (("corridor", "--out", "{out}", "--baseline", "-1"), "baseline_m must be positive"),
         (("corridor", "--out", "{out}/nowhere/drive.mcap"), "no such folder"),
+        (("corridor", "--out", "{out}.txt"), "its name must end with .mcap"),
+        (("corridor", "--out", "{out}", "--payload", "1000"), "payload_kg must be 0 to 12"),
+        (("corridor", "--out", "{out}", "--width", "100000"), "width must be 16 to 4096 px"),
+        (("corridor", "--out", "{out}", "--camera-height", "-1"), "height must be over 0"),
+        (
+            ("corridor", "--out", "{out}", "--renderer", "crayon"),
+            "no renderer named 'crayon'; choose from: bullet, raster",
+        ),
+        (("corridor", "--out", "{out}", "--people", "-1"), "people must be >= 0"),
     ],
 )
 def test_bad_input_gets_one_line_and_leaves_no_file(

@@ -1,0 +1,1 @@
+"""The simulated Pioneer 3-AT: its physics, its senses and its wheel odometry."""

@@ -1,0 +1,1 @@
+"""What worlds are made of: solids, textures, light, ground, and what moves."""

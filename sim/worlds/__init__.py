@@ -1,0 +1,1 @@
+"""The worlds, and the furniture, plants and people in them."""
