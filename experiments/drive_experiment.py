@@ -41,7 +41,7 @@ class DriveExperimentConfig:
     seed makes the world, noise_seed draws the noise of cameras and odometry. every_m: distance between two
     pairs [m]. distance_m: how much of the path is driven, 0 = all [m]. score_range_m: the visible set reaches so
     far [m]. obstacles_m: the heights above the ground of the cells that are scored as obstacles [m]. people: so
-    many walk about. image_noise: a text for sim.faults.camera_faults. wheel_faults: a preset of
+    many walk about. camera_faults: a text for sim.faults.camera_faults. wheel_faults: a preset of
     sim.robot.wheel_faults, under odometry_noise. known_tilt: whether there is an arm that knows the true height,
     roll and pitch. noisy_motion_error: eps of the noisy arms, in place of mapping's.
     """
@@ -54,7 +54,7 @@ class DriveExperimentConfig:
     score_range_m: float = 5.0
     obstacles_m: tuple[float, float] = OBSTACLES_M
     people: int = 0
-    image_noise: str = "mild"
+    camera_faults: str = "mild"
     wheel_faults: str = "none"
     known_tilt: bool = False
     odometry_noise: OdometryNoise = field(
@@ -66,7 +66,7 @@ class DriveExperimentConfig:
     noisy_motion_error: MotionError = field(default_factory=lambda: MotionError(a_m=1e-5))
 
     def __post_init__(self) -> None:
-        camera_faults(self.image_noise)
+        camera_faults(self.camera_faults)
         wheel_faults(self.wheel_faults)
         self.mapping.build_mapper(MINORU)
         if not (np.isfinite(self.score_range_m) and self.score_range_m > 0):
@@ -131,7 +131,7 @@ def arms(drive: Recording, config: DriveExperimentConfig, track: Track) -> dict[
 
 def _faulty(drive: Recording, config: DriveExperimentConfig) -> Recording:
     """The drive as its cameras and wheels would have it; without wheel faults it needs no ticks."""
-    seen = FaultyCameras(drive, camera_faults(config.image_noise), config.noise_seed)
+    seen = FaultyCameras(drive, camera_faults(config.camera_faults), config.noise_seed)
     faults = wheel_faults(config.wheel_faults)
     return seen if faults == wheel_faults("none") else FaultyWheels(seen, faults, config.noise_seed)
 

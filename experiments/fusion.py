@@ -34,14 +34,14 @@ class FusionConfig:
     """Every parameter of the experiment; the file config.toml of a run holds them.
 
     matchers: seen on the drive; kz2 takes 18 s a pair. n_seeds: image noise is drawn with the seeds 1, 2, ... n_seeds.
-    image_noise: see sim.faults.camera_faults. num_disparities: searched on the drive. clamps_of: the matcher whose maps
-    show what clamps do, "" for none. frame_seeds: worlds of frames with independent noise, 0 for none. frame_cells_m:
-    the cells that these are mapped with [m]. street, room: the real sequences, where there are any.
+    camera_faults: see sim.faults.camera_faults. num_disparities: searched on the drive. clamps_of: the matcher whose
+    maps show what clamps do, "" for none. frame_seeds: worlds of frames with independent noise, 0 for none.
+    frame_cells_m: the cells that these are mapped with [m]. street, room: the real sequences, where there are any.
     """
 
     matchers: tuple[str, ...] = ("bm", "sgbm", "gc")
     n_seeds: int = 5
-    image_noise: str = "mild"
+    camera_faults: str = "mild"
     num_disparities: int = 80
     clamps_of: str = "bm"
     drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
@@ -54,7 +54,7 @@ class FusionConfig:
     room: RoomConfig = field(default_factory=RoomConfig)
 
     def __post_init__(self) -> None:
-        camera_faults(self.image_noise)
+        camera_faults(self.camera_faults)
         for name in ("n_seeds", "num_disparities"):
             if not getattr(self, name) > 0:
                 raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
@@ -72,7 +72,7 @@ class FusionConfig:
     def seeing(self) -> Seeing:
         """How the drive is seen and mapped."""
         mapping = MappingConfig(model=self.model, grid=self.grid)
-        return Seeing(mapping, self.image_noise, tuple(range(1, self.n_seeds + 1)), self.num_disparities)
+        return Seeing(mapping, self.camera_faults, tuple(range(1, self.n_seeds + 1)), self.num_disparities)
 
 
 def run(

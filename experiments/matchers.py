@@ -31,14 +31,14 @@ class MatchersConfig:
     """Every parameter of the experiment; the file config.toml of a run holds them.
 
     reference: the contender that the others are compared with. most_pixels: larger pairs are shrunk. n_seeds: image
-    noise is drawn with the seeds 1, 2, ... n_seeds. image_noise: see sim.faults.camera_faults. num_disparities:
+    noise is drawn with the seeds 1, 2, ... n_seeds. camera_faults: see sim.faults.camera_faults. num_disparities:
     searched on the drive. contenders: sections as contenders.Contender has them, by name.
     """
 
     reference: str = "bm"
     most_pixels: int = 400_000
     n_seeds: int = 5
-    image_noise: str = "mild"
+    camera_faults: str = "mild"
     num_disparities: int = 80
     drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
     model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
@@ -46,7 +46,7 @@ class MatchersConfig:
     contenders: dict = field(default_factory=default_table)
 
     def __post_init__(self) -> None:
-        camera_faults(self.image_noise)
+        camera_faults(self.camera_faults)
         for name in ("most_pixels", "n_seeds", "num_disparities"):
             if not getattr(self, name) > 0:
                 raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
@@ -65,7 +65,7 @@ class MatchersConfig:
     def seeing(self) -> Seeing:
         """How the drive is seen and mapped."""
         mapping = MappingConfig(model=self.model, grid=self.grid)
-        return Seeing(mapping, self.image_noise, tuple(range(1, self.n_seeds + 1)), self.num_disparities)
+        return Seeing(mapping, self.camera_faults, tuple(range(1, self.n_seeds + 1)), self.num_disparities)
 
 
 def run(

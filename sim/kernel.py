@@ -7,8 +7,9 @@ from numba import njit
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-# No sum is reordered: results are the same on every run.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "arcp", "nsz"}}
+# IEEE arithmetic throughout. Were products and sums allowed to contract, results would hang on what the compiler
+# happens to inline, and the first run on a machine, which compiles, would differ from those that read its cache.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 
 def kernel(function: _Function) -> _Function:

@@ -18,8 +18,8 @@ _RANGES = {
     "gamma": (0.5, 5),
     "sharpening": (0, 10),
     "jpeg_quality": (1, 100),
-    "rolling_shutter_s": (0, 1),
-    "time_skew_s": (0, 1),
+    "rolling_shutter_s": (0, 0.1),
+    "time_skew_s": (0, 0.1),
     "drop_share": (0, 1),
     "repeat_share": (0, 1),
 }

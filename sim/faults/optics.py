@@ -100,7 +100,8 @@ class Lens:
         """Where in the scene's picture each raw pixel looks."""
         x, y = _rays(self.raw)
         shrink = _undistorted(np.hypot(x, y), self.k1)
-        rays = np.stack([x * shrink, y * shrink, np.ones_like(x)], axis=-1) @ self.R_scene_raw.T
+        # By einsum: unlike matmul it sums in one order on any number of threads, and this reaches pixels.
+        rays = np.einsum("hwa,ba->hwb", np.stack([x * shrink, y * shrink, np.ones_like(x)], axis=-1), self.R_scene_raw)
         return _pixels(self.scene, rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2])
 
     @cached_property

@@ -59,7 +59,7 @@ def serve(
         loop = Loop(renew(), Firmware(subclass, tick_s=TICK_S), link, Pacer(TICK_S), log, renew=renew)
         if eyes and server:
             loop.watch = open_things.enter_context(Eyes(scene, eyes, loop.body, server)).see
-            say(f"cameras: {server.url}")
+            say(f"cameras: {server.url}left.mjpg {server.url}right.mjpg")
         with held_interrupts() as interrupted:
             say(f"{subclass} in {world} (seed {seed}): {link.name}")
             loop.pacer.restart()

@@ -7,6 +7,8 @@ import numpy as np
 from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import FloatArray, yaw_rad
 
+from ..scene.route import Route
+
 MAX_SPEED_MPS = 0.7
 MAX_TURN_RADPS = 0.8
 ACCELERATION_MPS2 = 0.4
@@ -26,10 +28,8 @@ class PathFollower:
     def __post_init__(self) -> None:
         if not 0 < self.speed_mps <= MAX_SPEED_MPS:
             raise InvalidInputError(f"speed_mps must be in (0, {MAX_SPEED_MPS}], not {self.speed_mps}")
-        steps = np.linalg.norm(np.diff(self.waypoints_m, axis=0), axis=1)
-        self._stations_m = np.concatenate([[0.0], np.cumsum(steps)])
-        length_m = float(self._stations_m[-1])
-        self.length_m = length_m if self.end_m is None else min(self.end_m, length_m)
+        self._route = Route(self.waypoints_m)
+        self.length_m = self._route.length_m if self.end_m is None else min(self.end_m, self._route.length_m)
         self.progress_m = 0.0
         self._speed_mps = 0.0
         self._turn_radps = 0.0
@@ -43,7 +43,7 @@ class PathFollower:
         """Forward speed [m/s] and turn rate [rad/s] for the next dt_s."""
         here = T_world_base[:2, 3]
         self._advance(here)
-        goal = self._point(self.progress_m + LOOKAHEAD_M) - here
+        goal = self._route.at(self.progress_m + LOOKAHEAD_M) - here
         distance_m = float(np.hypot(*goal))
         bearing = float(np.arctan2(goal[1], goal[0])) - yaw_rad(T_world_base)
         bearing = float(np.arctan2(np.sin(bearing), np.cos(bearing)))
@@ -59,28 +59,20 @@ class PathFollower:
 
     def _advance(self, here: FloatArray) -> None:
         """Move the progress to the nearest point of the path a little ahead; it never goes back."""
-        k = self._segment(self.progress_m)
+        k, stations_m = self._segment(self.progress_m), self._route.stations_m
         start, end = self.waypoints_m[k], self.waypoints_m[k + 1]
         along = (here - start) @ (end - start) / np.linalg.norm(end - start)
         # At a corner the next leg takes over once it is the nearer one.
-        station = self._stations_m[k] + min(along, self._stations_m[k + 1] - self._stations_m[k])
+        station = stations_m[k] + min(along, stations_m[k + 1] - stations_m[k])
         if k + 2 < len(self.waypoints_m):
             after = self.waypoints_m[k + 2] - end
             beyond = (here - end) @ after / np.linalg.norm(after)
-            if beyond > self._stations_m[k + 1] - station:
-                station = self._stations_m[k + 1] + beyond
+            if beyond > stations_m[k + 1] - station:
+                station = stations_m[k + 1] + beyond
         self.progress_m = max(self.progress_m, float(station))
 
-    def _point(self, station_m: float) -> FloatArray:
-        """The path at a distance from its start; beyond its end it goes straight on."""
-        k = self._segment(station_m)
-        start, end = self.waypoints_m[k], self.waypoints_m[k + 1]
-        share = (station_m - self._stations_m[k]) / (self._stations_m[k + 1] - self._stations_m[k])
-        point: FloatArray = start + share * (end - start)
-        return point
-
     def _segment(self, station_m: float) -> int:
-        return int(np.clip(np.searchsorted(self._stations_m, station_m) - 1, 0, len(self._stations_m) - 2))
+        return int(np.clip(np.searchsorted(self._route.stations_m, station_m) - 1, 0, len(self._route.stations_m) - 2))
 
 
 def _limits(size: float) -> tuple[float, float]:

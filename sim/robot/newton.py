@@ -1,5 +1,7 @@
 """The convex function whose minimum is the robot's velocity after a step (see tyres), and Newton's way to it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from stereogrid.geometry import Array
@@ -17,22 +19,34 @@ def huber(x: float, small: float) -> float:
     return x - small / 2 if x > small else x * x / (2 * small)
 
 
-@kernel
-def energy(
-    v: Array, v_before: Array, push: Array, M: Array, rows: Array, load: Array, spin: Array, still: float
-) -> float:
-    """What the velocity v (8,) minimises.
+class Step(NamedTuple):
+    """A time step, as energy reads it. The velocities (8,): of the centre of mass, angular, spins of the two sides.
 
-    v_before (8,): the velocity a step ago. push (8,): impulses that do not depend on v. M (8, 8): masses and moments.
-    rows (K, 3, 8): slip along and across, and speed away from the ground, of each contact. load (K, 3): impulse of
-    friction at most [Ns], of the spring and damper at rest, and their growth per m/s, 0 where PyBullet bears the load.
-    spin (2, 5): target, what is missing of it at full torque, and impulses of motor and of rolling; the smallest spin.
+    before (8,): the velocity a step ago. push (8,): impulses that do not depend on the velocity. M (8, 8): masses and
+    moments. rows (K, 3, 8): slip along and across, and speed away from the ground, of each contact, from the velocity.
+    load (K, 3): impulse of friction at most [Ns], of the spring and damper at rest, and their growth per m/s, 0 where
+    PyBullet bears the load. spin (2, 5): target, what is missing of it at full torque, and impulses of motor and of
+    rolling; the smallest spin. still: slip below which a tyre gives less than all its force [m/s].
     """
-    d = v - v_before
-    total: float = 0.5 * (d @ (M @ d)) - push @ v
+
+    before: Array
+    push: Array
+    M: Array
+    rows: Array
+    load: Array
+    spin: Array
+    still: float
+
+
+@kernel
+def energy(v: Array, step: Step) -> float:
+    """What the velocity v (8,) minimises."""
+    rows, load, spin = step.rows, step.load, step.spin
+    d = v - step.before
+    total: float = 0.5 * (d @ (step.M @ d)) - step.push @ v
     for k in range(len(load)):
         s, t = rows[k, 0] @ v, rows[k, 1] @ v
-        total += load[k, 0] * huber(np.sqrt(s * s + t * t), still)
+        total += load[k, 0] * huber(np.sqrt(s * s + t * t), step.still)
         if load[k, 2] > 0:
             total += 0.5 * max(load[k, 1] - load[k, 2] * (rows[k, 2] @ v), 0.0) ** 2 / load[k, 2]
     for j in range(2):
@@ -41,21 +55,11 @@ def energy(
 
 
 @kernel
-def slope(
-    v: Array,
-    v_before: Array,
-    push: Array,
-    M: Array,
-    rows: Array,
-    load: Array,
-    spin: Array,
-    still: float,
-    g: Array,
-    H: Array,
-) -> None:
+def slope(v: Array, step: Step, g: Array, H: Array) -> None:
     """The gradient g (8,) and the second derivative H (8, 8) of energy at v."""
-    g[:] = M @ (v - v_before) - push
-    H[:] = M
+    rows, load, spin, still = step.rows, step.load, step.spin, step.still
+    g[:] = step.M @ (v - step.before) - step.push
+    H[:] = step.M
     for k in range(len(load)):
         s, t = rows[k, 0] @ v, rows[k, 1] @ v
         size = np.sqrt(s * s + t * t)
@@ -103,19 +107,17 @@ def solve(H: Array, g: Array) -> Array:
 
 
 @kernel
-def settle(
-    v: Array, v_before: Array, push: Array, M: Array, rows: Array, load: Array, spin: Array, still: float
-) -> int:
+def settle(v: Array, step: Step) -> int:
     """Move v (8,) to the minimum of energy by Newton's method, each step halved until it gains; returns the steps."""
     g, H = np.empty(8), np.empty((8, 8))
-    now = energy(v, v_before, push, M, rows, load, spin, still)
+    now = energy(v, step)
     for k in range(MOST_ITERATIONS):
-        slope(v, v_before, push, M, rows, load, spin, still, g, H)
+        slope(v, step, g, H)
         d = solve(H, g)
         gain = g @ d
         share = 1.0
         while share > 1e-6:
-            then = energy(v - share * d, v_before, push, M, rows, load, spin, still)
+            then = energy(v - share * d, step)
             if then <= now - 1e-4 * share * gain:
                 break
             share *= 0.5

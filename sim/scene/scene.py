@@ -11,6 +11,7 @@ from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import FloatArray
 
 from .movers import Mover
+from .route import Route
 from .solids import Solid, fan
 from .terrain import Terrain
 from .textures import Texture
@@ -107,7 +108,12 @@ class World:
             for face in solid.faces
         )
 
+    @cached_property
+    def route(self) -> Route:
+        """The path, asked for by station."""
+        return Route(self.waypoints_m)
+
     @property
     def path_length_m(self) -> float:
         """Length of the polyline through the waypoints [m]."""
-        return float(np.linalg.norm(np.diff(self.waypoints_m, axis=0), axis=1).sum())
+        return self.route.length_m

@@ -127,13 +127,8 @@ def pose_at(world: World, station_m: float) -> FloatArray:
         raise InvalidInputError(
             f"the path of {world.name!r} is {world.path_length_m:.1f} m long: no place is {station_m:g} m along it"
         )
-    legs = np.diff(world.waypoints_m, axis=0)
-    lengths = np.linalg.norm(legs, axis=1)
-    ends = np.cumsum(lengths)
-    k = min(int(np.searchsorted(ends, station_m, side="right")), len(legs) - 1)
-    ahead = legs[k] / lengths[k]
-    xy = world.waypoints_m[k] + (station_m - ends[k] + lengths[k]) * ahead
-    return _on_ground(world, xy, ahead)
+    yaw = world.route.yaw_rad(station_m)
+    return _on_ground(world, world.route.at(station_m), np.array([np.cos(yaw), np.sin(yaw)]))
 
 
 def _on_ground(world: World, xy_m: FloatArray, ahead: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from stereogrid.geometry import FloatArray, from_rotation, from_yaw
 
+from ..scene.route import Route
 from ..scene.scene import Sky, World
 from ..scene.solids import Paint, Solid, box
 from ..scene.terrain import Terrain
@@ -23,7 +24,6 @@ from .car import WHEEL_X_M, car
 from .facade import BAY_M, Front, house
 from .outdoor_ground import KERB_Y_M, make_ground
 from .paving import kerb, path, street
-from .route import Route
 from .street_furniture import bench, bin_on_post, bollard, fence, grounded, lamp_post, low_wall
 
 CORNERS_M = ((0.0, 0.0), (16.0, 0.0), (16.0, 18.0), (-4.0, 18.0), (-4.0, 6.5))

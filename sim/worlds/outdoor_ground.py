@@ -7,9 +7,9 @@ from scipy.ndimage import map_coordinates
 
 from stereogrid.geometry import FloatArray
 
+from ..scene.route import SAMPLE_M, Route
 from ..scene.terrain import Terrain
 from ..scene.textures import noise
-from .route import SAMPLE_M, Route
 
 PITCH_M = 0.35
 ORIGIN_M = (-13.3, -15.1)

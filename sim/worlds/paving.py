@@ -7,10 +7,10 @@ import numpy as np
 
 from stereogrid.geometry import FloatArray
 
+from ..scene.route import Route
 from ..scene.skin import Skin, prism, skinned
 from ..scene.solids import Solid
 from ..scene.terrain import Terrain
-from .route import Route
 
 PROUD_M = 0.015
 """Paths stand out of the ground by this much: what a wheel meets at their edge."""

@@ -59,7 +59,7 @@ class _Plan:
         self.added: list[Mover] = []
         self._clearance = Clearance(world)
         self._path = PathFollower(world.waypoints_m, robot_speed_mps)
-        self._waypoints_m = world.waypoints_m
+        self._route = world.route
         self._robot = _drive(self._path)
         self._times_s: FloatArray = STEP_S * np.arange(len(self._robot), dtype=np.float64)
         self._others = [(mover.places(self._times_s)[:, :2], _room_m(mover.solids)) for mover in world.movers]
@@ -87,14 +87,11 @@ class _Plan:
         """A free straight way (2, 2), along the path or across it, for a body that reaches half_m before and behind
         it [m]; None where a guess finds no room."""
         station_m = float(rng.uniform(0, self._path.length_m))
-        legs = np.diff(self._waypoints_m, axis=0)
-        ends_m: FloatArray = np.cumsum(np.linalg.norm(legs, axis=1))
-        leg = min(int(np.searchsorted(ends_m, station_m)), len(legs) - 1)
-        ahead = legs[leg] / np.linalg.norm(legs[leg])
-        aside = np.array([-ahead[1], ahead[0]])
+        yaw = self._route.yaw_rad(station_m)
+        ahead, aside = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
         along = rng.random() < 0.5
         offset_m = float(rng.choice([-1, 1])) * float(rng.uniform(APART_M, 4.0)) if along else 0.0
-        middle = self._waypoints_m[leg + 1] - (ends_m[leg] - station_m) * ahead + offset_m * aside
+        middle = self._route.at(station_m, offset_m)
         direction = ahead if along else aside
         back_m, on_m = (self._reach_m(middle, sign * direction) for sign in (-1, 1))
         back_m, on_m = (reach - max(half_m + 0.1 - ROOM_M, 0.0) for reach in (back_m, on_m))

@@ -129,7 +129,7 @@ def average_nodes(disparity: Array, sigma: Array, layout: Array, gates: tuple[fl
                 _merge(sums, upper + bw - 1, lower + bw - 1, first + row * w + whole, 1, 0, np.float32(gates[0]), step)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy")
 def _merge(sums: Array, upper: int, lower: int, to: int, count: int, right: int, gate: float, step: float) -> None:
     """Merge children 2 i and 2 i + right, i < count, of the rows beginning at upper and lower into nodes from `to`."""
     zero, one = np.float32(0), np.float32(1)
@@ -156,7 +156,7 @@ def _merge(sums: Array, upper: int, lower: int, to: int, count: int, right: int,
         n[i] = weight
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy")
 def judge_nodes(sums: Array, start: int, constants: Array, linear: bool, readings: Array) -> None:
     """Fill readings (5, N) float32 from sums (4, N): d, d / sigma, relief / sigma, free_to, hidden_from [m];
     nodes before start are left out.

@@ -280,7 +280,7 @@ def _phi(x: Any) -> Any:
     return x * p
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, nogil=True, error_model="numpy")
 def _judge(readings: Array, near_by: Array, count: int, model: Judgement, ratio: Array) -> None:
     """Write the mean likelihood ratio of the four nodes of each cell, 0 where all of them are hidden or invalid.
 

@@ -36,8 +36,8 @@ def stamps_s(recording: Recording) -> FloatArray:
     return np.array([each.stamp_s for each in recording], dtype=float)
 
 
-class TruePoses:
-    """A recording that claims its true poses: T_world_cam is the truth, T_odom_base agrees with it.
+class _ByTruth:
+    """A recording that claims other poses, which its truth helps to tell; T_odom_base agrees with them.
 
     travelled_m and turned_rad stay as the odometry has them. Raises RecordingError when an observation
     carries no truth; the first one is tried at once.
@@ -56,33 +56,36 @@ class TruePoses:
         for each in self._recording:
             if each.truth is None:
                 raise RecordingError(f"the observation at {each.stamp_s} s carries no true pose")
-            yield _with_pose(each, each.truth.T_world_cam, self.T_base_cam)
+            claimed = self._claimed(each, each.truth.T_world_cam)
+            yield _with_pose(each, claimed, self.T_base_cam)
+
+    def _claimed(self, each: Observation, T_world_cam: FloatArray) -> FloatArray:
+        """The pose to claim of an observation whose true one is T_world_cam."""
+        raise NotImplementedError
 
 
-class TrueTilt:
+class TruePoses(_ByTruth):
+    """A recording that claims its true poses: T_world_cam is the truth, T_odom_base agrees with it.
+
+    Raises RecordingError when an observation carries no truth; the first one is tried at once.
+    """
+
+    def _claimed(self, each: Observation, T_world_cam: FloatArray) -> FloatArray:  # noqa: ARG002
+        return T_world_cam
+
+
+class TrueTilt(_ByTruth):
     """A recording that claims its own x, y and heading, and the true height, roll and pitch.
 
     As a robot on uneven ground with an inclinometer: wheels alone know of no slope. Raises RecordingError when an
     observation carries no truth; the first one is tried at once.
     """
 
-    def __init__(self, recording: Recording) -> None:
-        self._recording = recording
-        self.camera = recording.camera
-        self.T_base_cam = recording.T_base_cam
-        next(iter(self), None)
-
-    def __len__(self) -> int:
-        return len(self._recording)
-
-    def __iter__(self) -> Iterator[Observation]:
-        for each in self._recording:
-            if each.truth is None:
-                raise RecordingError(f"the observation at {each.stamp_s} s carries no true tilt")
-            claimed, true = (T @ inverse(self.T_base_cam) for T in (each.T_world_cam, each.truth.T_world_cam))
-            tilted = from_yaw(yaw_rad(claimed) - yaw_rad(true)) @ true
-            tilted[:3, 3] = [*claimed[:2, 3], true[2, 3]]
-            yield _with_pose(each, tilted @ self.T_base_cam, self.T_base_cam)
+    def _claimed(self, each: Observation, T_world_cam: FloatArray) -> FloatArray:
+        claimed, true = (T @ inverse(self.T_base_cam) for T in (each.T_world_cam, T_world_cam))
+        tilted = from_yaw(yaw_rad(claimed) - yaw_rad(true)) @ true
+        tilted[:3, 3] = [*claimed[:2, 3], true[2, 3]]
+        return tilted @ self.T_base_cam
 
 
 class Subset:

@@ -110,7 +110,7 @@ def test_the_same_seed_gives_the_same_hashes_and_another_seed_does_not(tmp_path)
     [
         ({"wheel_faults": "square"}, "no wheel faults named 'square'; choose from: good, none, worn"),
         ({"people": -1}, "people"),
-        ({"image_noise": "foggy"}, "foggy.*ideal, mild"),
+        ({"camera_faults": "foggy"}, "foggy.*ideal, mild"),
         ({"every_m": -1.0}, "every_m"),
         ({"score_range_m": float("nan")}, "score_range_m"),
         ({"seed": -1}, "seed"),

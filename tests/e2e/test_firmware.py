@@ -83,7 +83,7 @@ def test_a_client_drives_over_tcp_while_opencv_watches_through_the_cameras(
 ) -> None:
     options = ("corridor", "--port", "0", "--camera", "--camera-port", "0", "--width", "160", "--height", "120")
     with running(*options, "--subclass", "p3at-sh", "--battery", "12.3", lines=2) as (_, said):
-        cameras = said[0].removeprefix("cameras: ")
+        cameras = said[0].removeprefix("cameras: ").split()[0].removesuffix("left.mjpg")
         assert said[1].startswith("p3at-sh in corridor (seed 0): 127.0.0.1:")
         port = int(said[1].rsplit(":", 1)[1])
         views = [cv2.VideoCapture(f"{cameras}{side}.mjpg", cv2.CAP_FFMPEG) for side in ("left", "right")]

@@ -203,7 +203,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(tmp_path, monkeypatch, capsys,
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"image_noise": "foggy"}, "foggy.*mild"),
+        ({"camera_faults": "foggy"}, "foggy.*mild"),
         ({"n_seeds": 0}, "n_seeds"),
         ({"most_pixels": -1}, "most_pixels"),
         ({"reference": "sgmb"}, "sgmb.*bm"),

@@ -96,7 +96,7 @@ def test_the_config_is_saved_whole_and_the_report_stands_alone(finished):
         ('world = "moon"', "no world named 'moon'; choose from: corridor, .*outdoor"),
         ("obstacles_m = [2.0, 1.0]", "obstacles_m must be two heights"),
         ("obstacles_m = [1.0]", "obstacles_m must be two heights"),
-        ('image_noise = "foggy"', "foggy.*choose from: .*ideal"),
+        ('camera_faults = "foggy"', "foggy.*choose from: .*ideal"),
         ("distance = 3", "unknown key 'distance'; did you mean 'distance_m'"),
     ],
 )

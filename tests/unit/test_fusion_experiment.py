@@ -169,7 +169,7 @@ def test_every_clamp_is_one_that_the_grid_takes(clamp):
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"image_noise": "foggy"}, "foggy.*mild"),
+        ({"camera_faults": "foggy"}, "foggy.*mild"),
         ({"n_seeds": 0}, "n_seeds"),
         ({"frame_seeds": -1}, "frame_seeds"),
         ({"matchers": ()}, "matchers"),

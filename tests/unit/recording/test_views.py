@@ -59,7 +59,7 @@ def test_a_known_tilt_changes_height_roll_and_pitch_and_leaves_the_rest(mcap_fil
 
 
 def test_a_known_tilt_needs_truth(kitti_folder: Path) -> None:
-    with pytest.raises(RecordingError, match=r"observation at 0\.0 s carries no true tilt"):
+    with pytest.raises(RecordingError, match=r"observation at 0\.0 s carries no true pose"):
         TrueTilt(KittiRecording(kitti_folder))
 
 

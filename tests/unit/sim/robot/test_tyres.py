@@ -12,11 +12,11 @@ from sim.robot.chassis import Chassis
 from sim.robot.ground import SURFACES, Surface, find_surface
 from sim.scene.terrain import Terrain
 from stereogrid.errors import InvalidInputError
-from stereogrid.geometry import Array, FloatArray
+from stereogrid.geometry import FloatArray
 
 
-def problem(seed: int) -> tuple[Array, ...]:
-    """A step of a robot on some contacts, some of which slide and some of which hold; its start (8,) first."""
+def problem(seed: int, still: float) -> newton.Step:
+    """A step of a robot on some contacts, some of which slide and some of which hold."""
     rng = np.random.default_rng(seed)
     root = rng.standard_normal((8, 8))
     M = root @ root.T + 8 * np.eye(8)
@@ -24,35 +24,35 @@ def problem(seed: int) -> tuple[Array, ...]:
     load = np.abs(rng.standard_normal((5, 3)))
     load[3, 1:] = 0.0
     spin = np.array([[1.0, 0.05, 0.4, 0.1, 0.01], [-1.0, 0.05, 0.4, 0.1, 0.01]])
-    return rng.standard_normal(8), rng.standard_normal(8), M, rows, load, spin
+    return newton.Step(rng.standard_normal(8), rng.standard_normal(8), M, rows, load, spin, still)
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("still", [1e-3, 0.3])
 def test_newton_finds_the_minimum_that_a_general_method_finds(seed: int, still: float) -> None:
-    before, push, M, rows, load, spin = problem(seed)
-    v = before.copy()
-    assert newton.settle(v, before, push, M, rows, load, spin, still) < newton.MOST_ITERATIONS
+    step = problem(seed, still)
+    v = step.before.copy()
+    assert newton.settle(v, step) < newton.MOST_ITERATIONS
 
     def energy(x: FloatArray) -> float:
-        return newton.energy(x, before, push, M, rows, load, spin, still)
+        return newton.energy(x, step)
 
-    best = min((minimize(energy, start, tol=1e-10) for start in (before, v)), key=lambda found: found.fun)
+    best = min((minimize(energy, start, tol=1e-10) for start in (step.before, v)), key=lambda found: found.fun)
     assert energy(v) <= best.fun + 1e-9
     assert v == pytest.approx(best.x, abs=1e-3)
 
 
 def test_the_slope_is_that_of_the_energy_and_the_curvature_that_of_the_slope() -> None:
-    before, push, M, rows, load, spin = problem(1)
-    v = before + 0.1
+    step = problem(1, 0.3)
+    v = step.before + 0.1
     g, H, ahead, behind, scratch = np.empty(8), np.empty((8, 8)), np.empty(8), np.empty(8), np.empty((8, 8))
-    newton.slope(v, before, push, M, rows, load, spin, 0.3, g, H)
+    newton.slope(v, step, g, H)
     for k in range(8):
         d = 1e-6 * np.eye(8)[k]
-        rise = [newton.energy(v + s * d, before, push, M, rows, load, spin, 0.3) for s in (1, -1)]
+        rise = [newton.energy(v + s * d, step) for s in (1, -1)]
         assert g[k] == pytest.approx((rise[0] - rise[1]) / 2e-6, abs=1e-6)
-        newton.slope(v + d, before, push, M, rows, load, spin, 0.3, ahead, scratch)
-        newton.slope(v - d, before, push, M, rows, load, spin, 0.3, behind, scratch)
+        newton.slope(v + d, step, ahead, scratch)
+        newton.slope(v - d, step, behind, scratch)
         assert H[k] == pytest.approx((ahead - behind) / 2e-6, abs=1e-5)
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sim.scene.route import SAMPLE_M, Route
 from sim.scene.solids import Solid, fan
 from sim.worlds.outdoor import Site, furnished
-from sim.worlds.route import SAMPLE_M, Route
 from stereogrid.geometry import FloatArray
 
 CLEARANCE_M = 0.6

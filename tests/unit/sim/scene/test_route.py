@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.worlds.route import SAMPLE_M, Route
+from sim.scene.route import SAMPLE_M, Route
 
 CORNERS_M = ((0.0, 0.0), (10.0, 0.0), (10.0, 8.0))
 

@@ -49,7 +49,7 @@ class Route:
         """Points (..., 2) [m] beside the way, lateral_m to its left; on straight lines beyond its ends."""
         station = as_floats(station_m)
         k = np.clip(np.searchsorted(self.stations_m, station, side="right") - 1, 0, len(self.waypoints_m) - 2)
-        ahead = self._ahead(k)
+        ahead = self._ahead[k]
         left = np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
         along = (station - self.stations_m[k])[..., None] * ahead
         points: FloatArray = self.waypoints_m[k] + along + as_floats(lateral_m)[..., None] * left
@@ -58,12 +58,12 @@ class Route:
     def yaw_rad(self, station_m: float) -> float:
         """Heading at a station [rad]."""
         k = int(np.clip(np.searchsorted(self.stations_m, station_m, side="right") - 1, 0, len(self.waypoints_m) - 2))
-        ahead = self._ahead(np.array(k))
+        ahead = self._ahead[k]
         return float(np.arctan2(ahead[1], ahead[0]))
 
     def offset(self, lateral_m: float) -> FloatArray:
         """The waypoints (N, 2) of a line parallel to the way, lateral_m to its left, with mitred corners."""
-        ahead = self._ahead(np.arange(len(self.waypoints_m) - 1))
+        ahead = self._ahead
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
         before, after = left[[0, *range(len(left))]], left[[*range(len(left)), -1]]
         middle = before + after
@@ -80,8 +80,9 @@ class Route:
         distance, index = cKDTree(self.samples_m).query(as_floats(xy_m))
         return np.asarray(distance), np.asarray(index) * SAMPLE_M
 
-    def _ahead(self, k: ArrayLike) -> FloatArray:
-        """Unit directions (..., 2) of the legs k."""
+    @cached_property
+    def _ahead(self) -> FloatArray:
+        """Unit directions (N - 1, 2) of the legs."""
         legs = np.diff(self.waypoints_m, axis=0)
-        unit: FloatArray = (legs / np.linalg.norm(legs, axis=1, keepdims=True))[k]
+        unit: FloatArray = legs / np.linalg.norm(legs, axis=1, keepdims=True)
         return unit
