@@ -9,7 +9,7 @@ import typer
 
 from stereogrid.cli import run as run_command
 
-from .screen import RUNS, ConfigFile, Drive, OnlyMatchers, Runs, chosen, print_tables, show
+from .screen import RUNS, WORK, ConfigFile, Drive, Drives, OnlyMatchers, Runs, Work, chosen, print_tables, show
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,6 +133,66 @@ def fusion(
     show(lambda stage, command: run(chosen(FusionConfig, config), stage, command=command, **given))
 
 
+@app.command(epilog="Example: python -m experiments claim --publish docs/claim")
+def claim(
+    config: ConfigFile = None,
+    work: Work = WORK,
+    publish: Annotated[Path | None, typer.Option(help="Copy figures and the first scores there as well.")] = None,
+    runs: Runs = RUNS,
+) -> None:
+    """Test the paper's claim: do maps get better when the mapper is told of the poses' error, and is it bounded?
+
+    Stopped and started again it goes on where it was.
+    """
+    from .claim import run
+    from .claim_config import ClaimConfig
+
+    given = {"runs": runs, "work": work, "publish": publish}
+    show(lambda stage, command: run(chosen(ClaimConfig, config), stage, command=command, **given))
+
+
+@app.command(epilog="Example: python -m experiments claim-tune --config candidates.toml")
+def claim_tune(config: ConfigFile = None, work: Work = WORK, runs: Runs = RUNS) -> None:
+    """Try candidates for the claim's parameters, on worlds that the claim is not scored on."""
+    from .claim import tune
+    from .claim_config import TuneConfig
+
+    show(lambda stage, command: tune(chosen(TuneConfig, config), stage, runs=runs, work=work, command=command))
+
+
+@app.command(epilog="Example: python -m experiments motion --surfaces vinyl,gravel")
+def motion(
+    config: ConfigFile = None,
+    surfaces: Annotated[str | None, typer.Option(help="Only these, with commas between them.  [all]")] = None,
+    runs: Runs = RUNS,
+) -> None:
+    """Drive over marked lines and turns again and again, and fit the motion error to what odometry says of them."""
+    from .motion import MotionConfig, run
+
+    parameters = chosen(MotionConfig, config)
+    if surfaces is not None:
+        parameters = replace(parameters, surfaces=tuple(each.strip() for each in surfaces.split(",")))
+    show(lambda stage, command: run(parameters, stage, runs=runs, command=command))
+
+
+@app.command(epilog="Example: python -m experiments budget --recording corridor.mcap --recording office.mcap")
+def budget(config: ConfigFile = None, recording: Drives = None, runs: Runs = RUNS) -> None:
+    """Split a map's error: matching, calibration, odometry, cells and fusion made true, or real, one at a time."""
+    from .budget import BudgetConfig, run
+
+    parameters = chosen(BudgetConfig, config)
+    show(lambda stage, command: run(parameters, stage, runs=runs, recordings=recording or (), command=command))
+
+
+@app.command(epilog="Example: python -m experiments printed --recording corridor.mcap")
+def printed(config: ConfigFile = None, recording: Drive = None, runs: Runs = RUNS) -> None:
+    """Map one drive by the chapter's equations as printed and as corrected, and count what goes wrong."""
+    from .printed import PrintedConfig, run
+
+    parameters = chosen(PrintedConfig, config)
+    show(lambda stage, command: run(parameters, stage, runs=runs, recording=recording, command=command))
+
+
 @app.command(epilog="Example: python -m experiments energy --pairs ../shared/data/stereo")
 def energy(
     pairs: Annotated[Path, typer.Option(help="Folder of pairs with known disparity, one folder each.")],
@@ -154,7 +214,7 @@ def grid_bench(
     from .grid_bench import run
 
     folder, tables = run(bench, runs=runs, picture=picture)
-    print_tables(tables, captions=True)
+    print_tables(tables, notes=True)
     typer.echo(folder / "tables.md")
 
 

@@ -43,8 +43,12 @@ class Compared:
 
     def difference(self, arm: str, name: str) -> Interval:
         """How much higher the arm's score is than the reference's, unit by unit."""
+        return self.between(arm, self.reference, name)
+
+    def between(self, arm: str, other: str, name: str) -> Interval:
+        """How much higher the arm's score is than the other arm's, unit by unit."""
         rng = np.random.default_rng(BOOTSTRAP_SEED)
-        return paired_difference(self.values(arm, name), self.values(self.reference, name), rng=rng)
+        return paired_difference(self.values(arm, name), self.values(other, name), rng=rng)
 
     def label(self, name: str) -> str:
         """The score's name, with its unit where the name does not say it."""

@@ -15,23 +15,19 @@ import numpy as np
 from sim.faults import FaultyCameras, camera_faults
 from sim.rig import MINORU
 from sim.robot.wheel_faults import FaultyWheels, wheel_faults
-from stereogrid.camera import StereoCamera
 from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, save_config
-from stereogrid.errors import InvalidInputError, RecordingError
+from stereogrid.errors import InvalidInputError
 from stereogrid.mapping_run import Mapped, Track, build_map
-from stereogrid.motion import MotionError, NoisyOdometry, OdometryNoise
-from stereogrid.observation import Disparity, Observation, Recording
+from stereogrid.motion import Growth, MotionError, NoisyOdometry, OdometryNoise
+from stereogrid.observation import Recording
 from stereogrid.recording import ShuffledPoses, TruePoses, TrueTilt
 from stereogrid.runs import finished_path, run_folder
 from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import SensorModel
 
 from .drive_report import IDEAL, KNOWN_TILT, NOISY, SHUFFLED, TRUE_DEPTH, Outcome, Story, write_results
-from .drives import OBSTACLES_M, DriveConfig, about, open_drive, record, score
+from .drives import OBSTACLES_M, DriveConfig, about, open_drive, record, score, true_disparity
 from .parallel import Stage, counted, in_parallel
-
-TRUE_SIGMA_PX = 0.05
-"""Of the true disparity: small against any matcher's, large enough that the sensor model stays smooth."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,7 @@ class DriveExperimentConfig:
         )
     )
     mapping: MappingConfig = field(default_factory=lambda: bm_mapping(range_m=5.0, cell_m=0.05))
-    noisy_motion_error: MotionError = field(default_factory=lambda: MotionError(a_m=1e-5))
+    noisy_motion_error: MotionError = field(default_factory=lambda: MotionError(along=Growth(a=1e-5)))
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
@@ -134,16 +130,6 @@ def _faulty(drive: Recording, config: DriveExperimentConfig) -> Recording:
     seen = FaultyCameras(drive, camera_faults(config.camera_faults), config.noise_seed)
     faults = wheel_faults(config.wheel_faults)
     return seen if faults == wheel_faults("none") else FaultyWheels(seen, faults, config.noise_seed)
-
-
-def true_disparity(camera: StereoCamera, observation: Observation) -> Disparity:
-    """The disparity of the true depth (H, W)."""
-    if observation.truth is None or observation.truth.depth_m is None:
-        raise RecordingError("the recording carries no true depth, so the ceiling cannot be mapped")
-    depth_m = observation.truth.depth_m
-    disparity_px = camera.disparity_px(np.where(depth_m > 0, depth_m, np.nan)).astype(np.float32)
-    disparity_px[disparity_px == 0] = np.nan  # infinitely far
-    return Disparity(disparity_px, np.full_like(disparity_px, TRUE_SIGMA_PX))
 
 
 def score_arms(drive: Recording, config: DriveExperimentConfig, stage: Stage) -> tuple[MapTruth, dict[str, Outcome]]:

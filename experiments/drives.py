@@ -9,12 +9,14 @@ import numpy as np
 
 from sim.record import record_drive
 from sim.rendering.renderers import RASTER
+from sim.rig import MINORU, StereoRig, webcam
 from sim.robot.pioneer import SimulationError
 from sim.worlds.world import WorldPlan
+from stereogrid.camera import StereoCamera
 from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Mapped
-from stereogrid.observation import Recording
+from stereogrid.observation import Disparity, Observation, Recording
 from stereogrid.recording import open_recording
 from stereogrid.scoring import Score
 from stereogrid.scoring.truth import MapTruth
@@ -37,6 +39,8 @@ HEADLINE = (
 )
 """What the tables show of the scores in metrics.json."""
 FEWEST_PAIRS = 2
+TRUE_SIGMA_PX = 0.05
+"""Of the true disparity: small against any matcher's, large enough that the sensor model stays smooth."""
 OBSTACLES_M = (0.15, 2.4)
 """Heights between the floor and the ceiling of the corridor [m]."""
 OBSTACLE_SCORES = ("auc", "occupied_precision", "occupied_recall", "occupied_f1")
@@ -57,7 +61,8 @@ OBSTACLE_MEANINGS = obstacle_meanings(OBSTACLES_M)
 class DriveConfig:
     """A simulated drive. seed paints the world, in which so many people walk.
 
-    every_m: distance between two pairs [m]. distance_m: how much of the path is driven, 0 = all [m].
+    every_m: distance between two pairs [m]. distance_m: how much of the path is driven, 0 = all [m]. width_px,
+    height_px: of the images; the cameras stay 42 degrees wide.
     """
 
     world: str = "corridor"
@@ -65,14 +70,22 @@ class DriveConfig:
     every_m: float = 0.25
     distance_m: float = 0.0
     people: int = 0
+    width_px: int = MINORU.width_px
+    height_px: int = MINORU.height_px
 
     def __post_init__(self) -> None:
         WorldPlan(self.world, self.seed, self.people)
+        _ = self.rig
         if not (np.isfinite(self.every_m) and self.every_m > 0):
             raise InvalidInputError(f"every_m must be positive and finite, not {self.every_m}")
         for name in ("seed", "distance_m"):
             if not getattr(self, name) >= 0:
                 raise InvalidInputError(f"{name} must be >= 0, not {getattr(self, name)}")
+
+    @property
+    def rig(self) -> StereoRig:
+        """The cameras on the robot."""
+        return StereoRig(webcam(self.width_px, self.height_px))
 
 
 def record(drive: DriveConfig, path: Path, stage: Stage) -> Path:
@@ -88,6 +101,7 @@ def record(drive: DriveConfig, path: Path, stage: Stage) -> Path:
                 world=drive.world,
                 seed=drive.seed,
                 people=drive.people,
+                rig=drive.rig,
                 every_m=drive.every_m,
                 max_distance_m=drive.distance_m or None,
                 progress=step.to,
@@ -108,21 +122,36 @@ def open_drive(path: Path) -> Recording:
     return drive
 
 
+def true_disparity(camera: StereoCamera, observation: Observation) -> Disparity:
+    """The disparity of the true depth (H, W)."""
+    if observation.truth is None or observation.truth.depth_m is None:
+        raise RecordingError("the recording carries no true depth, so the ceiling cannot be mapped")
+    depth_m = observation.truth.depth_m
+    disparity_px = camera.disparity_px(np.where(depth_m > 0, depth_m, np.nan)).astype(np.float32)
+    disparity_px[disparity_px == 0] = np.nan  # infinitely far
+    return Disparity(disparity_px, np.full_like(disparity_px, TRUE_SIGMA_PX))
+
+
 def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
     """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
     return score_grid(truth, obstacles, mapped.grid)
 
 
-def score_grid(truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid) -> list[Score]:
-    """The same of a grid."""
+def score_grid(truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid, *, surface: bool = True) -> list[Score]:
+    """The same of a grid; without those of the surface, which take the most time, where surface is False."""
     among = obstacles.score(grid, prior=grid.model.prior, surface=False)
     named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
-    return [*truth.score(grid, prior=grid.model.prior), *named]
+    return [*truth.score(grid, prior=grid.model.prior, surface=surface), *named]
 
 
 def about(drive: Recording) -> dict[str, str]:
     """Facts of a drive for a report: a reused one tells its own seed and spacing, which the config may not."""
     return {"pairs": str(len(drive)), **{f"drive {key}": value for key, value in _metadata(drive).items()}}
+
+
+def world_of(drive: Recording) -> str:
+    """The world of a simulated drive; "unknown" where it does not say."""
+    return _metadata(drive).get("world", "unknown")
 
 
 def _metadata(drive: Recording) -> Mapping[str, str]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .grid import OccupancyGrid, State
     from .mapper import Mapper
     from .matching import matcher
-    from .motion import MotionError, NoisyOdometry, OdometryNoise
+    from .motion import Growth, MotionError, MotionNoise, NoisyOdometry, OdometryNoise, PoseUncertainty
     from .observation import Disparity, Matcher, Observation, Odometry, Recording, Source, Truth
     from .recording import open_recording
     from .sensor_model import SensorModel
@@ -31,15 +31,18 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Disparity",
+    "Growth",
     "Mapper",
     "MappingConfig",
     "Matcher",
     "MotionError",
+    "MotionNoise",
     "NoisyOdometry",
     "Observation",
     "OccupancyGrid",
     "Odometry",
     "OdometryNoise",
+    "PoseUncertainty",
     "Recording",
     "Rectification",
     "SensorModel",
@@ -61,7 +64,7 @@ _HOMES = {
     "grid": ("OccupancyGrid", "State"),
     "mapper": ("Mapper",),
     "matching": ("matcher",),
-    "motion": ("MotionError", "NoisyOdometry", "OdometryNoise"),
+    "motion": ("Growth", "MotionError", "MotionNoise", "NoisyOdometry", "OdometryNoise", "PoseUncertainty"),
     "observation": ("Disparity", "Matcher", "Observation", "Odometry", "Recording", "Source", "Truth"),
     "recording": ("open_recording",),
     "sensor_model": ("SensorModel",),

@@ -15,6 +15,7 @@ from rich.progress import track as rich_track
 from rich.table import Table
 
 from .errors import InvalidInputError, StereogridError
+from .motion_cli import motion_error
 
 if TYPE_CHECKING:
     from .config import MappingConfig, MatcherConfig
@@ -50,6 +51,7 @@ def map_command(
     num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
     cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
     max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
+    motion: Annotated[Path | None, typer.Option(help="A motion.toml, as motion-error writes it.")] = None,
     pose_source: Annotated[
         str, typer.Option("--poses", help="odometry (what the recording claims) or truth.")
     ] = "odometry",
@@ -65,7 +67,7 @@ def map_command(
         raise InvalidInputError(f"--poses must be odometry or truth, not {pose_source!r}")
     chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
     chosen = replace(chosen, matcher=_chosen_matcher(chosen.matcher, matcher, network, num_disparities))
-    chosen = _overridden(chosen, cell, max_range)
+    chosen = _overridden(chosen, cell, max_range, motion)
     result = map_recording(
         TruePoses(source) if pose_source == "truth" else source,
         chosen,
@@ -90,8 +92,18 @@ def _chosen_matcher(
     return replace(config, name=name, network=kept, num_disparities=count)
 
 
-def _overridden(config: "MappingConfig", cell: float | None, max_range: float | None) -> "MappingConfig":
+def _overridden(
+    config: "MappingConfig", cell: float | None, max_range: float | None, motion: Path | None
+) -> "MappingConfig":
     """config with the options that were given on the command line."""
+    from .config import load_config
+    from .motion import MotionError
+
+    if motion is not None:
+        error = load_config(MotionError, motion)
+        if error.is_zero and error.way != "none":
+            raise InvalidInputError(f"{motion}: tells of no error, so way = {error.way!r} has nothing to go by")
+        config = replace(config, motion_error=error)
     if cell is not None:
         config = replace(config, grid=replace(config.grid, cell_m=cell))
     if max_range is not None:
@@ -163,6 +175,11 @@ def export_command(
     given = {name: value for name, value in options.items() if value is not None}
     check_export(out, **given)
     export(OccupancyGrid.load(grid), out, **given)
+
+
+app.command("motion-error", epilog="Example: stereogrid motion-error runs.csv --out motion.toml --figure motion.png")(
+    motion_error
+)
 
 
 @app.command("config", epilog="Example: stereogrid config my.toml")

@@ -44,6 +44,28 @@ def as_pose(T: ArrayLike, name: str = "pose") -> FloatArray:
     return pose
 
 
+COVARIANCE_TOLERANCE = 1e-6
+"""How far a covariance may be from symmetric and from positive semidefinite, relative: it may be float32."""
+
+
+def as_covariance(values: ArrayLike, size: int, name: str = "covariance") -> FloatArray:
+    """Values as a finite, symmetric, positive semidefinite (size, size) matrix; raises InvalidInputError otherwise."""
+    matrix = np.array(values, dtype=np.float64)
+    if matrix.shape != (size, size):
+        raise InvalidInputError(f"{name} must be ({size}, {size}), not {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise InvalidInputError(f"{name} must be finite, without NaN or infinity")
+    tolerance = COVARIANCE_TOLERANCE * float(np.abs(matrix).max())
+    asymmetry = float(np.abs(matrix - matrix.T).max())
+    if asymmetry > tolerance:
+        raise InvalidInputError(f"{name} must be symmetric; it is off by {asymmetry:.3g}")
+    matrix = 0.5 * matrix + 0.5 * matrix.T
+    least = float(np.linalg.eigvalsh(matrix)[0])
+    if least < -tolerance:
+        raise InvalidInputError(f"{name} must be positive semidefinite; it has the eigenvalue {least:.3g}")
+    return matrix
+
+
 def from_rotation(R: ArrayLike, t_m: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """The (4, 4) pose of a (3, 3) rotation and a translation (3,) [m]."""
     T = np.eye(4)

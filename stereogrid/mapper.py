@@ -1,11 +1,15 @@
 """The method on one screen: match, model, integrate."""
 
+from typing import Any
+
 from .camera import StereoCamera
 from .grid import OccupancyGrid
 from .matching.correlation import ErrorReach
-from .motion import MotionError
+from .motion import MotionError, PoseUncertainty
 from .novelty import Novelty
 from .observation import Disparity, Matcher, Observation
+from .sensor_model import MOTION_RULES
+from .submaps import Submaps
 
 
 class Mapper:
@@ -26,6 +30,10 @@ class Mapper:
         grid.check_fits(camera)
         self.camera, self.matcher, self.grid = camera, matcher, grid
         self.motion_error = motion_error or MotionError()
+        self._uncertainty = PoseUncertainty(self.motion_error)
+        # Where poses are exact there is nothing to lay elsewhere, and the grid's clamp acts observation by observation.
+        pieces = self.motion_error.way == "submaps" and not self.motion_error.is_zero
+        self._submaps = Submaps(camera, grid, self.motion_error) if pieces else None
         self.novelty = Novelty(camera, reach)
 
     def step(self, observation: Observation) -> Disparity:
@@ -36,6 +44,23 @@ class Mapper:
 
     def fuse(self, observation: Observation, disparity: Disparity) -> None:
         """Fuse an observation whose disparity is already known."""
-        motion_sigma_m = self.motion_error.sigma_m(observation.odometry)
         weight = self.novelty.weight(disparity, observation.T_world_cam)
-        self.grid.integrate(self.camera, disparity, observation.T_world_cam, motion_sigma_m, weight=weight)
+        if self._submaps:
+            self._submaps.fuse(observation, disparity, weight)
+            return
+        motion = self._motion(observation)
+        self.grid.integrate(self.camera, disparity, observation.T_world_cam, weight=weight, **motion)
+
+    def finish(self) -> None:
+        """Call it after the last observation: what the way "submaps" still holds back goes into the grid."""
+        if self._submaps:
+            self._submaps.finish()
+
+    def _motion(self, observation: Observation) -> dict[str, Any]:
+        """What the grid is told of the error of the pose, as OccupancyGrid.integrate takes it."""
+        way = self.motion_error.way
+        if way == "pose":
+            return {"pose_covariance": self._uncertainty.step(observation)}
+        if way in MOTION_RULES:
+            return {"motion_sigma_m": self.motion_error.sigma_m(observation.odometry), "motion_rule": way}
+        return {}

@@ -118,6 +118,10 @@ def map_while_it_fits(
             sample = (observation, disparity)
     if sample is None:
         raise RecordingError("the recording holds no complete observation, so there is nothing to map")
+    try:
+        mapper.finish()
+    except MapTooLargeError as error:
+        stopped = stopped or error
     return Mapped(mapper.grid, np.array(poses), sample, float(np.mean(densities)), stopped)
 
 

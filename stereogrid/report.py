@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .errors import InvalidInputError
 from .files import written_beside
-from .scoring import SCORE_NAMES, Score
+from .scoring import BOUND_NAMES, SCORE_NAMES, Score
 from .scoring.score import DIMENSIONLESS
 
 STYLE = """
@@ -89,9 +89,9 @@ def write_report(
     """Write folder/report.html with the figures inside it.
 
     arms: scores of each arm of the experiment, by the arm's name; those named in headline come first, or the tables
-    instead, where there are any; all scores come after the figures. meanings: of scores that SCORE_NAMES does not
-    hold. facts: what was run (command, seed, ...); versions and the machine are added. config.toml is quoted where it
-    stands in the folder.
+    instead, where there are any; all scores come after the figures. meanings: of scores that neither SCORE_NAMES nor
+    BOUND_NAMES holds. facts: what was run (command, seed, ...); versions and the machine are added. config.toml is
+    quoted where it stands in the folder.
     """
     first = {
         arm: sorted((score for score in scores if score.name in headline), key=lambda score: headline.index(score.name))
@@ -123,7 +123,7 @@ def write_report(
 
 def score_table(arms: Mapping[str, Sequence[Score]], meanings: Mapping[str, str] | None = None) -> str:
     """The scores as an HTML table: a row a score, a column an arm, the unit and the meaning beside them."""
-    known = {name: meaning for name, (_, meaning) in SCORE_NAMES.items()} | dict(meanings or {})
+    known = {name: meaning for name, (_, meaning) in (SCORE_NAMES | BOUND_NAMES).items()} | dict(meanings or {})
     names = list(dict.fromkeys(score.name for scores in arms.values() for score in scores))
     by_arm = {arm: {score.name: score for score in scores} for arm, scores in arms.items()}
     head = "".join(f"<th>{html.escape(arm)}</th>" for arm in arms)

@@ -16,6 +16,7 @@ from .geometry import FloatArray, as_floats
 
 FORMS = ("corrected", "printed")
 MOTION_RULES = ("rss", "linear")
+"""How eps joins the stereo error in Eq. 13: as independent errors add, or the paper's sum, a worst-case bound."""
 REACH_SIGMAS = 3.5
 """Further than this before the measured surface a cell is plainly free."""
 REACH_BEHIND_SIGMAS = 1.5
@@ -35,8 +36,6 @@ class SensorModel:
 
     p_free, p_occupied: what one reading claims at most (p_min and p_max). prior: p0 of Eq. 3.
     max_range_m: depths beyond it are not used. form: "corrected" or "printed" (Eqs. 3 and 11 as in the paper).
-    motion: how eps joins the stereo error in Eq. 13, "rss" (independent errors, the default) or "linear"
-    (the paper's sum, a worst-case bound).
     """
 
     p_free: float = 0.25
@@ -44,7 +43,6 @@ class SensorModel:
     prior: float = 0.5
     max_range_m: float = 8.0
     form: str = "corrected"
-    motion: str = "rss"
 
     def __post_init__(self) -> None:
         if not 0 < self.p_free < self.prior < self.p_occupied < 1:
@@ -56,8 +54,6 @@ class SensorModel:
             raise InvalidInputError(f"max_range_m must be positive and finite, not {self.max_range_m}")
         if self.form not in FORMS:
             raise unknown_name("form of the sensor model", self.form, FORMS)
-        if self.motion not in MOTION_RULES:
-            raise unknown_name("motion rule", self.motion, MOTION_RULES)
 
 
 def log_odds(probability: ArrayLike) -> FloatArray:
@@ -104,15 +100,22 @@ def range_and_sigma_m(points_cam: ArrayLike, depth_sigma_m: ArrayLike) -> tuple[
 
 
 def widened_sigma_px(
-    camera: StereoCamera, disparity_px: ArrayLike, sigma_px: ArrayLike, *, motion_sigma_m: float, motion: str = "rss"
+    camera: StereoCamera,
+    disparity_px: ArrayLike,
+    sigma_px: ArrayLike,
+    *,
+    motion_sigma_m: ArrayLike,
+    motion_rule: str = "rss",
 ) -> FloatArray:
     """The disparity sigma that carries eps of Eq. 13 as well [px], any shape.
 
-    dz = z^2 dd / (b f) + eps is, in disparity space, dd + eps d^2 / (b f): one number a pixel. "linear" adds
-    the two as the paper does, "rss" as independent errors add.
+    dz = z^2 dd / (b f) + eps is, in disparity space, dd + eps d^2 / (b f): one number a pixel. motion_rule: one of
+    MOTION_RULES.
     """
-    eps_px = motion_sigma_m * np.square(as_floats(disparity_px)) / camera.focal_baseline_px_m
-    if motion == "linear":
+    if motion_rule not in MOTION_RULES:
+        raise unknown_name("motion rule", motion_rule, MOTION_RULES)
+    eps_px = as_floats(motion_sigma_m) * np.square(as_floats(disparity_px)) / camera.focal_baseline_px_m
+    if motion_rule == "linear":
         return as_floats(sigma_px) + eps_px
     widened: FloatArray = np.hypot(sigma_px, eps_px)
     return widened

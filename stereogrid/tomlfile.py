@@ -68,7 +68,9 @@ def load_config(kind: type[T], path: str | Path) -> T:
         return config_from_table(kind, tomllib.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ConfigError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: is no text in UTF-8, as TOML must be") from None
+    except (ConfigError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"{path}: {error}") from None
 
 

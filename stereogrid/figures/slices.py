@@ -36,7 +36,7 @@ def slice_figure(
     width_m, depth_m = _span_m(grid, height_m)
     figure = Figure(figsize=(9, float(np.clip(7.2 * depth_m / width_m, 2.0, 9)) + 1.2), layout="constrained")
     axes = figure.add_subplot()
-    image = _draw(axes, grid, height_m)
+    image = draw_slice(axes, grid, height_m)
     figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
     _overlays(axes, path_m, truth_segments_m)
     _legend(figure, axes)
@@ -58,7 +58,7 @@ def slices_figure(
     figure, all_axes = _side_by_side(np.max([_span_m(grid, height_m) for grid in grids.values()], axis=0), len(grids))
     limits = []
     for axes, (name, grid) in zip(all_axes, grids.items(), strict=True):
-        image = _draw(axes, grid, height_m)
+        image = draw_slice(axes, grid, height_m)
         limits.append(image.get_extent())
         _overlays(axes, path_m, truth_segments_m)
         axes.set(title=name, xlabel="x (world) [m]", ylabel="y (world) [m]")
@@ -90,7 +90,8 @@ def _span_m(grid: OccupancyGrid, height_m: float) -> tuple[float, float]:
     return max(x[-1] - x[0], 1e-9), max(y[-1] - y[0], 1e-9)
 
 
-def _draw(axes: Axes, grid: OccupancyGrid, height_m: float) -> AxesImage:
+def draw_slice(axes: Axes, grid: OccupancyGrid, height_m: float) -> AxesImage:
+    """The slice at z = height_m [m] alone, into axes."""
     x, y, p = _sample(grid, height_m)
     half = (x[1] - x[0]) / 2
     axes.set_facecolor(UNKNOWN_COLOUR)

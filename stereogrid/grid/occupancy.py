@@ -88,14 +88,29 @@ class OccupancyGrid(MapQueries):
         T_world_cam: ArrayLike,
         motion_sigma_m: float = 0.0,
         *,
+        motion_rule: str = "rss",
+        pose_covariance: ArrayLike | None = None,
         weight: float = 1.0,
     ) -> None:
-        """Fuse one observation seen from T_world_cam (4, 4). motion_sigma_m: eps of Eq. 13 [m].
+        """Fuse one observation seen from T_world_cam (4, 4).
 
-        weight: what of it is new, above 0 to 1 (frames from one place repeat their errors: see Mapper). Raises
-        InvalidInputError or MapTooLargeError and then leaves the map as it was.
+        motion_sigma_m: eps of Eq. 13 [m], which joins the stereo error by motion_rule, one of
+        sensor_model.MOTION_RULES. pose_covariance (6, 6): how well the pose is known, as motion.PoseUncertainty gives
+        it; it acts along each ray and across it. weight: what of the observation is new, above 0 to 1 (frames from one
+        place repeat their errors: see Mapper). Raises InvalidInputError or MapTooLargeError and then leaves the map as
+        it was.
         """
-        view = View(camera, disparity, T_world_cam, self.cell_m, self.model, motion_sigma_m, weight)
+        view = View(
+            camera,
+            disparity,
+            T_world_cam,
+            self.cell_m,
+            self.model,
+            eps_m=motion_sigma_m,
+            motion_rule=motion_rule,
+            pose_covariance=pose_covariance,
+            weight=weight,
+        )
         self.check_fits(camera)
         self._fuse(FUSIONS[self.fusion](view, self.threads))
 
@@ -167,6 +182,20 @@ class OccupancyGrid(MapQueries):
     def refined(self, factor: int) -> "OccupancyGrid":
         """A new map of cells `factor` times smaller, each a copy of the one that it lies in."""
         return self._holding(refined(self.blocks, factor, limit_gb=self.memory_limit_gb), self.cell_m / factor)
+
+    def spread(self, covariance: ArrayLike, about_m: ArrayLike) -> "OccupancyGrid":
+        """A new map: of each cell the mean probability over where the map may lie.
+
+        covariance (3, 3): of its displacement along x and y [m], and of its turn [rad] about the vertical through
+        about_m (2,) [m]. Raises InvalidInputError or MapTooLargeError.
+        """
+        from .spread import spread
+
+        return spread(self, covariance, about_m)
+
+    def emptied(self) -> "OccupancyGrid":
+        """A new map without cells that goes on as this one does."""
+        return self._holding(BlockStore(self.blocks.rule), self.cell_m)
 
     def _holding(self, blocks: BlockStore, cell_m: float) -> "OccupancyGrid":
         """A map with other cells that goes on as this one does."""

@@ -51,11 +51,15 @@ class Pyramid:
         model: SensorModel,
         *,
         motion_sigma_m: float = 0.0,
+        motion_rule: str = "rss",
+        left_m2: Array | None = None,
         finest: int = 0,
     ) -> "Pyramid":
         """The pyramid of one disparity image, until the next of this thread. motion_sigma_m: eps of Eq. 13 [m].
 
-        finest: the first level that will be read; what lies below is averaged, but not judged.
+        motion_rule: how eps joins the width. left_m2: covariance (3, 3) of the camera's position [m^2], along the
+        axes of cam, which widens each reading by its part along the ray (eps_of_nodes). finest: the first level that
+        will be read; what lies below is averaged, but not judged.
         """
         layout, sums, readings, nodes, windows = _buffers(camera.shape)
         steepest = STEEPEST / camera.focal_px
@@ -66,7 +70,11 @@ class Pyramid:
         constants = (looks_per_px, eps, camera.focal_baseline_px_m, *reach, *RELIEF_OF_NOISE, LEAST_CERTAINTY)
         finest = min(finest, len(layout) - 1)
         start = int(layout[finest, 0])
-        judge_nodes(sums, start, np.array(constants, np.float32), model.motion == "linear", readings)
+        of_nodes = None
+        if left_m2 is not None:
+            of_nodes = eps_of_nodes(camera, layout, motion_sigma_m, left_m2)
+            of_nodes = of_nodes[start:] / np.float32(camera.focal_baseline_px_m)
+        judge_nodes(sums, start, np.array(constants, np.float32), motion_rule == "linear", readings, of_nodes)
         pack_nodes(readings, start, readings[1:3].view(np.int32), nodes, nodes.view(np.int32))
         widen(readings[3], readings[4], layout[finest:], windows)
         return cls(nodes, windows, layout)
@@ -97,6 +105,39 @@ def layout_of(shape: tuple[int, int]) -> Array:
         if min(height, width) < 2 * SMALLEST_LEVEL:
             return np.array(levels, dtype=np.int64)
         height, width = (height + 1) // 2, (width + 1) // 2
+
+
+def eps_of_nodes(camera: StereoCamera, layout: Array, eps_m: float, left_m2: Array) -> Array:
+    """The depth error [m] (N,) float32 of the nodes of a layout (L, 3), from eps and the position's covariance (3, 3)
+    [m^2] along the axes of cam: both add as independent errors do.
+
+    Along the unit ray u the position errs by u^T S u; at depth z on a ray of length l that is (z / l)^2 times as much
+    in depth: v^T S v / |v|^4 with v = (x, y, 1).
+    """
+    eps = np.empty(int(layout[-1, 0] + layout[-1, 1] * layout[-1, 2]), np.float32)
+    fill_eps(layout, (camera.focal_px, camera.cx_px, camera.cy_px), float(eps_m) ** 2, left_m2, eps)
+    return eps
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_eps(layout: Array, optics: tuple[float, float, float], square: float, S: Array, eps: Array) -> None:
+    """Fill eps (N,) float32 [m]: see eps_of_nodes. optics: focal, cx, cy; square: eps^2 of all nodes [m^2]."""
+    focal, cx, cy = optics
+    one, always = np.float32(1), np.float32(square)
+    for level in range(len(layout)):
+        first, height, width = layout[level]
+        step, middle = float(1 << level), 0.5 * ((1 << level) - 1)
+        for row in range(height):
+            y = (row * step + middle - cy) / focal
+            # Along a row, v^T S v is a + (b + c x) x, and v^2 is e + x^2.
+            a, b = np.float32((S[1, 1] * y + 2 * S[1, 2]) * y + S[2, 2]), np.float32(2 * (S[0, 1] * y + S[0, 2]))
+            c, e = np.float32(S[0, 0]), one + np.float32(y * y)
+            x0, dx = np.float32((middle - cx) / focal), np.float32(step / focal)
+            of_row = eps[first + row * width : first + (row + 1) * width]
+            for n in range(width):
+                x = x0 + np.float32(n) * dx
+                over = one / (e + x * x)
+                of_row[n] = np.sqrt(max(a + (b + c * x) * x, np.float32(0)) * over * over + always)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -157,12 +198,13 @@ def _merge(sums: Array, upper: int, lower: int, to: int, count: int, right: int,
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def judge_nodes(sums: Array, start: int, constants: Array, linear: bool, readings: Array) -> None:
+def judge_nodes(sums: Array, start: int, constants: Array, linear: bool, readings: Array, eps_: Array | None) -> None:
     """Fill readings (5, N) float32 from sums (4, N): d, d / sigma, relief / sigma, free_to, hidden_from [m];
     nodes before start are left out.
 
     constants (8,) float32: looks a pixel, eps / (f b) [1 / px], f b, reach before and behind [sigmas], noise factors,
-    least certainty.
+    least certainty. eps_ float32: eps / (f b) of each node from start on; None: the same for all, and the compiled
+    kernel has no trace of it.
     """
     looks_per_px, eps, focal_baseline = constants[0], constants[1], constants[2]
     before, behind, least, more = constants[3], constants[4], constants[5], constants[6]
@@ -178,6 +220,8 @@ def judge_nodes(sums: Array, start: int, constants: Array, linear: bool, reading
     )
     for n in range(len(d_)):
         d, sigma, between, count = d_[n], sigma_[n], between_[n], count_[n]
+        if eps_ is not None:
+            eps = eps_[n]
         looks = max(count * looks_per_px, one)
         of_child = max(quarter * count * looks_per_px, one)
         noise = sigma * sigma

@@ -6,6 +6,7 @@ from numba import njit
 from ..camera import StereoCamera
 from ..geometry import Array, FloatArray, transform
 from .blocks import BLOCK
+from .hashing import FREE_SLOT, add_rows
 
 
 def blocks_in_view(camera: StereoCamera, T_world_cam: FloatArray, cell_m: float, *, max_range_m: float) -> Array:
@@ -23,6 +24,18 @@ def blocks_in_view(camera: StereoCamera, T_world_cam: FloatArray, cell_m: float,
     sides[:, 3] = -sides[:, :3] @ T_world_cam[:3, 3]
     blocks: Array = list_blocks(np.stack([low, high]), T_world_cam[:3, 3].copy(), sides, (block_m, max_range_m))
     return blocks
+
+
+def blocks_in_views(camera: StereoCamera, poses: FloatArray, cell_m: float, *, max_range_m: float) -> Array:
+    """As blocks_in_view, of all the blocks that meet any of the views from poses (K, 4, 4): sorted for one pose."""
+    views = [blocks_in_view(camera, pose, cell_m, max_range_m=max_range_m) for pose in poses]
+    if len(views) == 1:
+        return views[0]
+    found = np.concatenate(views)
+    slots = np.full(1 << (2 * len(found)).bit_length(), FREE_SLOT, dtype=np.int32)
+    blocks = np.empty_like(found)
+    count = add_rows(found, slots, blocks, 0, np.empty(len(found), dtype=np.int64))
+    return blocks[:count]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -104,9 +104,31 @@ def bound_coverage(true_range_m: FloatArray, measured_range_m: FloatArray, sigma
         raise InvalidInputError(f"true, measured and sigma ranges must have one shape, not {shapes}")
     true_m, measured_m, sigma_m = arrays
     hit = np.isfinite(true_m) & np.isfinite(measured_m) & np.isfinite(sigma_m)
-    within = np.abs(measured_m - true_m)[hit] <= COVERAGE_SIGMAS * sigma_m[hit]
-    n = int(np.count_nonzero(hit))
-    return Score("bound_coverage", ratio(int(np.count_nonzero(within)), n), DIMENSIONLESS, n)
+    share, n = covered(in_sigmas((measured_m - true_m)[hit], sigma_m[hit]))
+    return Score("bound_coverage", share, DIMENSIONLESS, n)
+
+
+def in_sigmas(error: FloatArray, sigma: FloatArray) -> FloatArray:
+    """|error| / sigma (N,); NaN where no error is claimed and there is none, infinite where there is one."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio: FloatArray = np.abs(error) / sigma
+    return ratio
+
+
+def covered(sigmas: FloatArray) -> tuple[float, int]:
+    """The share of errors (N,), each in its own sigmas, within 1.96, and how many there are; NaN are left out."""
+    n = int(np.count_nonzero(~np.isnan(sigmas)))
+    return ratio(int(np.count_nonzero(sigmas <= COVERAGE_SIGMAS)), n), n
+
+
+def stretch(sigmas: FloatArray, share: float = 0.95) -> float:
+    """By what all sigmas must be multiplied to cover that share of errors (N,), each in its own.
+
+    1 = as claimed, more = overconfident. NaN are left out; NaN without any, and where no factor covers so many.
+    """
+    known = sigmas[~np.isnan(sigmas)]
+    needed = float(np.quantile(known, share, method="inverted_cdf")) if len(known) else np.inf
+    return needed / COVERAGE_SIGMAS if np.isfinite(needed) else float("nan")
 
 
 def _mean(values: FloatArray) -> float:

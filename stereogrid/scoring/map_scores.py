@@ -1,7 +1,7 @@
 """All scores of one map against one mesh. `names.SCORE_NAMES` says what each is."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,8 @@ from .labels import OCCUPIED, CellLabels
 from .names import SCORE_NAMES
 from .ranking import ranking_scores, ratio
 from .score import Score
-from .surface import Surface, map_surface_m, surface_scores, visible_samples_m, voxelised_mesh_m
+from .surface import SeenSurface, map_surface_m, surface_scores
 from .visibility import VisibleSet
-
-if TYPE_CHECKING:
-    import trimesh
 
 Mask = NDArray[np.bool_]
 
@@ -73,16 +70,14 @@ def score_map(
     visible: VisibleSet,
     *,
     prior: float = 0.5,
-    mesh: "trimesh.Trimesh | None" = None,
+    seen: SeenSurface | None = None,
     camera: StereoCamera | None = None,
     sigma_px: float = SIGMA_PX,
-    rng: np.random.Generator | None = None,
 ) -> list[Score]:
-    """Every score of SCORE_NAMES in its order; those of the surface only when the mesh is given.
+    """Every score of SCORE_NAMES in its order; those of the surface only when it is given as seen.
 
     prior: what an unknown cell counts as. camera and sigma_px [px] set dl of the tolerance (Eq. 8); without
-    a camera tau is one cell. rng samples the mesh; by default always with one seed, so that maps that are
-    compared meet the same points. A score that is not defined (an empty class, no map) is NaN. Raises
+    a camera tau is one cell. A score that is not defined (an empty class, no map) is NaN. Raises
     InvalidInputError when V and the labels differ in shape, V is empty, or the map answers with what is no
     probability.
     """
@@ -90,22 +85,28 @@ def score_map(
         raise InvalidInputError(f"prior must lie between 0 and 1, not {prior}")
     cells = sample_cells(grid, labels, visible, camera=camera, sigma_px=sigma_px)
     values = _coverage(cells) | _ranking(cells, prior) | _calibration(cells, prior) | _others(cells, prior)
-    if mesh is not None:
-        surface = Surface.sample(mesh, labels.cell_m, rng or np.random.default_rng(0))
-        truth_m = visible_samples_m(surface, labels, visible)
+    if seen is not None:
         map_m = map_surface_m(grid.occupied_centres(), labels, visible)
-        values |= surface_scores(map_m, surface, truth_m, cell_m=labels.cell_m)
-        floor = surface_scores(voxelised_mesh_m(labels, visible), surface, truth_m, cell_m=labels.cell_m)
-        values |= {f"floor_{name}": value for name, value in floor.items()}
+        values |= surface_scores(map_m, seen.surface, seen.samples_m, cell_m=labels.cell_m)
+        values |= {f"floor_{name}": value for name, value in seen.floor.items()}
     return [Score(n, values[n][0], unit, values[n][1]) for n, (unit, _) in SCORE_NAMES.items() if n in values]
 
 
 def map_reliability(
-    grid: ScoredMap, labels: CellLabels, visible: VisibleSet, *, equal_count: bool = False
+    grid: ScoredMap,
+    labels: CellLabels,
+    visible: VisibleSet,
+    *,
+    prior: float | None = None,
+    equal_count: bool = False,
 ) -> ReliabilityTable:
-    """The reliability diagram of a map over the touched cells of V, in 10 bins of equal width or count."""
+    """The reliability diagram of a map in 10 bins of equal width or count: over the touched cells of V, or over all of
+    them where the prior is given that an unknown one counts as.
+    """
     cells = sample_cells(grid, labels, visible)
-    return reliability_table(cells.p[cells.touched], cells.occupied[cells.touched], equal_count=equal_count)
+    over = cells.touched if prior is None else np.ones_like(cells.touched)
+    p = cells.p if prior is None else cells.known(prior)
+    return reliability_table(p[over], cells.occupied[over], equal_count=equal_count)
 
 
 def sample_cells(

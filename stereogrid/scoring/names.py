@@ -1,4 +1,4 @@
-"""Every name that `score_map` gives, with its unit and meaning: one table for reports and readers.
+"""Every name that `score_map` and `BoundTest` give, with its unit and meaning: one table for reports and readers.
 
 Cells: all but INTERIOR ones, which nothing can see. A name without a suffix is taken over the cells that are
 visible and that the map has touched; `_all` over all of V, an unknown cell counting as the prior, so that
@@ -62,3 +62,25 @@ SCORE_NAMES: dict[str, tuple[str, str]] = {
     **{f"floor_{n}": (u, f"{m}, of the voxelised mesh") for n, (u, m) in SURFACE.items()},
 }
 """name -> (unit, meaning)."""
+
+ERRORS_OF_HITS = {
+    "along": "hits, error of the point along the ray",
+    "along_inliers": "hits without mismatches, error of the point along the ray",
+    "across": "hits, error of the point across the ray, where the pose's covariance is largest",
+    "surface": "hits, distance along the claimed ray from the hit to the first surface of the true mesh",
+    "surface_inliers": "hits without mismatches, the same distance",
+    "slant": "hits, the same distance; sigma of the pose's whole covariance on the slant of that surface",
+    "slant_inliers": "hits without mismatches, the same",
+}
+BOUND_NAMES: dict[str, tuple[str, str]] = {
+    "bound_mismatches": (DIMENSIONLESS, "share of hits whose disparity errs by more than 3 px"),
+    **{
+        f"bound_coverage_{kind}": (DIMENSIONLESS, f"share within 1.96 of the claimed sigma, nominal .95 ({meaning})")
+        for kind, meaning in ERRORS_OF_HITS.items()
+    },
+    **{
+        f"bound_stretch_{kind}": (DIMENSIONLESS, f"sigma times this would cover .95; 1 = as claimed ({meaning})")
+        for kind, meaning in ERRORS_OF_HITS.items()
+    },
+}
+"""name -> (unit, meaning) of what `BoundTest` gives. No name of these is one of a map's."""

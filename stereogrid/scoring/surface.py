@@ -150,3 +150,28 @@ def _f1(from_map: FloatArray, from_truth: FloatArray, tau_m: float) -> float:
     precision = float(np.mean(from_map <= tau_m)) if len(from_map) else 0.0
     recall = float(np.mean(from_truth <= tau_m))
     return 2 * precision * recall / (precision + recall) if precision + recall else 0.0
+
+
+@dataclass(frozen=True)
+class SeenSurface:
+    """What every map of one drive is held against: the mesh, its visible samples (N, 3) [m], and the floor, the scores
+    of the voxelised mesh itself.
+    """
+
+    surface: Surface
+    samples_m: FloatArray
+    floor: dict[str, tuple[float, int]]
+
+    @classmethod
+    def of(
+        cls,
+        mesh: "trimesh.Trimesh",
+        labels: CellLabels,
+        visible: VisibleSet,
+        rng: np.random.Generator | None = None,
+    ) -> "SeenSurface":
+        """rng samples the mesh; by default with one seed: maps that are compared are to meet the same points."""
+        surface = Surface.sample(mesh, labels.cell_m, rng or np.random.default_rng(0))
+        samples_m = visible_samples_m(surface, labels, visible)
+        voxels_m = voxelised_mesh_m(labels, visible)
+        return cls(surface, samples_m, surface_scores(voxels_m, surface, samples_m, cell_m=labels.cell_m))

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
@@ -15,10 +16,15 @@ from .heights import ground_height_m
 from .labels import CellLabels, label_cells
 from .map_scores import SIGMA_PX, ScoredMap, map_reliability, score_map
 from .score import Score
+from .surface import SeenSurface
 from .visibility import VisibleSet, visible_cells
 
 if TYPE_CHECKING:
     import trimesh
+
+
+AROUND_M = 1.0
+"""Beyond the range: surfaces there are not seen, but tell which free cells are near one."""
 
 
 @runtime_checkable
@@ -52,16 +58,24 @@ class MapTruth:
         cell_m: float,
         *,
         max_range_m: float,
+        around_path: bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> "MapTruth":
-        """Labels of cells of cell_m and the set seen within max_range_m. RecordingError without a truth."""
+        """Labels of cells of cell_m and the set seen within max_range_m. RecordingError without a truth.
+
+        around_path: label no more of the mesh than what a camera on the path has within its range, which is all that
+        can be seen: for large worlds of which a drive sees a part.
+        """
         mesh_ply = recording.truth_mesh_ply() if isinstance(recording, KnowsTruth) else None
         poses = recording.true_poses() if isinstance(recording, KnowsTruth) else None
         if mesh_ply is None or poses is None or not isinstance(recording, KnowsTruth):
             raise RecordingError("the recording carries no true mesh and poses, so there is nothing to score against")
         mesh = load_ply(mesh_ply)
         known = poses[~np.isnan(poses).any(axis=(1, 2))]
-        labels = label_cells(mesh, cell_m)
+        # One cell around the mesh, as where all of it is labelled.
+        ends_m = mesh.bounds + np.array([[-cell_m], [cell_m]])
+        bounds_m = bounds_around(known, ends_m, max_range_m + AROUND_M) if around_path else None
+        labels = label_cells(mesh, cell_m, bounds_m)
         visible = visible_cells(labels, mesh, recording.camera, known, max_range_m=max_range_m, progress=progress)
         return cls(mesh, recording.camera, labels, visible)
 
@@ -99,12 +113,17 @@ class MapTruth:
 
         surface: whether to give those of the surface too, which take the most time.
         """
-        mesh = self.mesh if surface else None
-        return score_map(grid, self.labels, self.visible, prior=prior, mesh=mesh, camera=self.camera, sigma_px=sigma_px)
+        seen = self.seen_surface if surface else None
+        return score_map(grid, self.labels, self.visible, prior=prior, seen=seen, camera=self.camera, sigma_px=sigma_px)
 
-    def reliability(self, grid: ScoredMap) -> ReliabilityTable:
-        """The reliability diagram of a map of this drive, 10 bins of equal width."""
-        return map_reliability(grid, self.labels, self.visible)
+    @cached_property
+    def seen_surface(self) -> SeenSurface:
+        """What surfaces of maps are held against: the same for all of them."""
+        return SeenSurface.of(self.mesh, self.labels, self.visible)
+
+    def reliability(self, grid: ScoredMap, *, prior: float | None = None) -> ReliabilityTable:
+        """The reliability diagram of a map of this drive, 10 bins of equal width; prior as in map_reliability."""
+        return map_reliability(grid, self.labels, self.visible, prior=prior)
 
     def section_m(self, height_m: float) -> FloatArray:
         """Segments (S, 2, 3) in which the true mesh meets the plane z = height_m [m]."""
@@ -112,6 +131,14 @@ class MapTruth:
 
         segments: FloatArray = np.asarray(mesh_plane(self.mesh, [0.0, 0.0, 1.0], [0.0, 0.0, height_m]))
         return segments.reshape(-1, 2, 3)
+
+
+def bounds_around(poses: FloatArray, ends_m: FloatArray, reach_m: float) -> FloatArray:
+    """(2, 3) the box within reach_m [m] of the poses (M, 4, 4), as far as the world's ends (2, 3) [m]."""
+    at_m = poses[:, :3, 3]
+    low_m = np.maximum(at_m.min(axis=0) - reach_m, ends_m[0])
+    high_m = np.minimum(at_m.max(axis=0) + reach_m, ends_m[1])
+    return np.stack([low_m, np.maximum(low_m, high_m)])
 
 
 def load_ply(ply: bytes) -> "trimesh.Trimesh":

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import StereoCamera
-from ..errors import InvalidInputError, MissingExtraError
+from ..errors import InvalidInputError
 from ..geometry import FloatArray, as_pose, from_rotation, inverse, transform
+from .casting import RayCaster
 from .kernels import Eyes, see_cells
 from .labels import INTERIOR, CellLabels
 
@@ -104,13 +105,6 @@ class _DepthCaster:
     """Depth images of a mesh from both eyes, on a lattice of rays that spans the image from edge to edge."""
 
     def __init__(self, mesh: "trimesh.Trimesh", camera: StereoCamera, *, pitch_px: float) -> None:
-        try:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-        except ImportError as error:
-            raise MissingExtraError(
-                "the visible set needs embreex to cast rays: pip install stereogrid[score]"
-            ) from error
         self.camera = camera
         columns = max(2, math.ceil(camera.width_px / pitch_px) + 1)
         rows = max(2, math.ceil(camera.height_px / pitch_px) + 1)
@@ -120,11 +114,7 @@ class _DepthCaster:
         y = (np.linspace(-0.5, camera.height_px - 0.5, rows) - camera.cy_px) / camera.focal_px
         # At depth 1, so that embree, which counts in lengths of the direction, returns depths.
         self._directions_cam = np.stack([*np.meshgrid(x, y), np.ones(self._shape)], axis=-1).reshape(-1, 3)
-        # Embree computes in float32: keep its numbers small wherever the world lies.
-        self._centre_m = np.asarray(mesh.bounds).mean(axis=0)
-        self._scene = EmbreeScene(robust=True)
-        triangles = np.asarray(mesh.triangles) - self._centre_m
-        self._mesh = TriangleMesh(self._scene, triangles.astype(np.float32))
+        self._caster = RayCaster(mesh)
 
     def inverse_depths(self, T_world_cam: FloatArray) -> tuple[FloatImage, FloatImage]:
         """Inverse depth of the first hits [1/m], (left, right) lattices; about 0 where nothing is hit."""
@@ -133,9 +123,7 @@ class _DepthCaster:
         return left, right
 
     def _cast(self, T_world_cam: FloatArray, x_m: float, directions: FloatImage) -> FloatImage:
-        eye_m = transform(T_world_cam, [x_m, 0.0, 0.0]) - self._centre_m
-        origins = np.tile(eye_m.astype(np.float32), (len(directions), 1))
-        depth_m = self._scene.run(origins, directions, query="DISTANCE")
+        depth_m = self._caster.lengths(transform(T_world_cam, [x_m, 0.0, 0.0]), directions)
         # An eye that touches a surface sees nothing beyond it; the floor keeps the quotient finite.
-        inverse_m: FloatImage = (1 / np.maximum(depth_m, np.float32(1e-6))).reshape(self._shape)
+        inverse_m: FloatImage = np.reciprocal(np.maximum(depth_m, np.float32(1e-6))).reshape(self._shape)
         return inverse_m

@@ -14,11 +14,12 @@ import typer
 
 from stereogrid import cli, mapping_run
 from stereogrid.camera import StereoCamera
-from stereogrid.config import MappingConfig, load_config
+from stereogrid.config import MappingConfig, load_config, save_config
 from stereogrid.exporting import EXPORTS
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
 from stereogrid.matching import MATCHERS
+from stereogrid.motion import Growth, MotionError
 from stereogrid.observation import Observation, Odometry, Truth
 from stereogrid.recording.mcap import McapWriter
 
@@ -91,6 +92,24 @@ def first_run(drive, tmp_path_factory):
     done = command("map", drive, "--out", "mine.sgrid", "--cell", "0.04", "--range", "3", cwd=cwd)
     assert done.returncode == 0, done.stderr
     return cwd, done
+
+
+def test_a_motion_error_from_repeated_runs_takes_the_place_of_the_configs(drive, tmp_path):
+    fitted = MotionError(way="linear", along=Growth(1e-3, 0.01), heading=Growth(1e-4, 0.02))
+    save_config(fitted, tmp_path / "motion.toml")
+    save_config(MappingConfig(motion_error=MotionError(position_m=0.5)), tmp_path / "config.toml")
+    options = ["--config", "config.toml", "--motion", "motion.toml", "--cell", "0.08"]
+    done = command("map", drive, *options, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert load_config(MappingConfig, tmp_path / "runs" / "latest" / "config.toml").motion_error == fitted
+    for text, message in (
+        ("[sideways]\na = 1\n", "motion.toml: unknown key 'sideways'.*"),
+        ("", "motion.toml: tells of no error, so way = 'rss' has nothing to go by"),
+    ):
+        (tmp_path / "motion.toml").write_text(text)
+        done = command("map", drive, *options, cwd=tmp_path)
+        assert done.returncode == 1
+        assert re.fullmatch(f"error: {message}\n", done.stderr)
 
 
 def numbers_of(table):

@@ -18,7 +18,7 @@ from stereogrid.config import (
 )
 from stereogrid.errors import ConfigError, InvalidInputError
 from stereogrid.matching.correlation import temporal_share
-from stereogrid.motion import MotionError
+from stereogrid.motion import Growth, MotionError
 from stereogrid.observation import Disparity
 from stereogrid.sensor_model import SensorModel
 
@@ -36,9 +36,8 @@ configs = st.builds(
         p_occupied=st.floats(0.61, 0.99),
         max_range_m=positive,
         form=st.sampled_from(["corrected", "printed"]),
-        motion=st.sampled_from(["rss", "linear"]),
     ),
-    motion_error=st.builds(MotionError, a_m=positive, b=positive, kappa=positive),
+    motion_error=st.builds(MotionError, kappa=positive, along=st.builds(Growth, positive, positive)),
     grid=st.builds(
         GridConfig,
         cell_m=positive,
@@ -90,7 +89,7 @@ def test_a_whole_number_will_do_where_a_float_is_expected(tmp_path):
         ("[[grid]]\ncell_m = 0.1\n", "'grid' must be a section, not [{'cell_m': 0.1}]"),
         ("[model]\np_free = 0.7\n", "[model] expected 0 < p_free < prior < p_occupied < 1, not p_free 0.7"),
         ('[model]\nform = "print"\n', "[model] no form of the sensor model named 'print'; choose from: corrected"),
-        ("[motion_error]\na_m = -1\n", "[motion_error] a_m must be >= 0 and finite, not -1.0"),
+        ("[motion_error.along]\na = -1\n", "[motion_error.along] a must be >= 0 and finite, not -1.0"),
         ("[grid\n", "at line 1"),
     ],
 )
@@ -156,7 +155,7 @@ def test_a_mapper_is_built_as_the_config_says():
     config = MappingConfig(
         MatcherConfig("sgbm", 48),
         SensorModel(max_range_m=3.0, form="printed"),
-        MotionError(a_m=0.001),
+        MotionError(along=Growth(a=0.001)),
         GridConfig(cell_m=0.1, fusion="sum_of_rays", clamp=(-2.0, 3.5), memory_limit_gb=1.0),
     )
     mapper = config.build_mapper(MINORU)
@@ -238,3 +237,10 @@ def test_lists_are_read_item_by_item_and_a_wrong_item_is_named_by_its_place(tmp_
 def test_a_key_without_a_default_is_asked_for_by_name():
     with pytest.raises(ConfigError, match="missing key 'shape'"):
         config_from_table(Lists, {})
+
+
+def test_a_file_that_is_no_text_is_named_as_such(tmp_path):
+    path = tmp_path / "config.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match=r"config\.toml: is no text in UTF-8, as TOML must be"):
+        load_config(MappingConfig, path)

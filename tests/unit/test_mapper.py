@@ -10,7 +10,7 @@ from stereogrid.geometry import from_yaw
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapper import Mapper
 from stereogrid.mapping_run import build_map, map_while_it_fits
-from stereogrid.motion import MotionError
+from stereogrid.motion import Growth, MotionError, PoseUncertainty
 from stereogrid.observation import Observation, Odometry
 from stereogrid.sensor_model import SensorModel
 
@@ -56,7 +56,7 @@ def test_a_step_fuses_what_the_matcher_found_at_the_claimed_pose_and_returns_it(
 
 
 def test_eps_comes_from_the_distance_travelled():
-    motion = MotionError(a_m=0.01, b=0.05, kappa=2.0)
+    motion = MotionError(along=Growth(0.01, 0.05), kappa=2.0)
     disparity = constant_disparity(4.0, 0.1)
     mapper = Mapper(CAMERA, Scripted([disparity]), OccupancyGrid(0.1, model=MODEL), motion)
     mapper.step(observation(0, travelled_m=4.0))
@@ -66,6 +66,26 @@ def test_eps_comes_from_the_distance_travelled():
     exact = OccupancyGrid(0.1, model=MODEL)
     exact.integrate(CAMERA, disparity, FORWARD)
     assert mapper.grid.sha256() == by_hand.sha256() != exact.sha256()
+
+
+def test_by_the_way_pose_each_observation_is_fused_with_the_covariance_of_its_pose():
+    error = MotionError(way="pose", along=Growth(0.01), heading=Growth(0.01), position_m=0.1)
+    made, drive = disparities(3), [observation(n, travelled_m=0.1 * n) for n in range(3)]
+    mapper = Mapper(CAMERA, Scripted(made), OccupancyGrid(0.1, model=MODEL), error)
+    by_hand = OccupancyGrid(0.1, model=MODEL)
+    uncertainty = PoseUncertainty(error)
+    for disparity, each in zip(made, drive, strict=True):
+        mapper.step(each)
+        by_hand.integrate(CAMERA, disparity, each.T_world_cam, pose_covariance=uncertainty.step(each))
+    assert mapper.grid.sha256() == by_hand.sha256()
+    exact, certain = (
+        Mapper(CAMERA, Scripted(made), OccupancyGrid(0.1, model=MODEL), MotionError(way=way))
+        for way in ("none", "pose")
+    )
+    for each in drive:
+        exact.step(each)
+        certain.step(each)
+    assert exact.grid.sha256() == certain.grid.sha256() != mapper.grid.sha256()
 
 
 def test_without_a_motion_error_poses_count_as_exact():

@@ -25,7 +25,7 @@ laws = settings(
 @cache
 def drawn_map():
     rng = np.random.default_rng(4)
-    model = SensorModel(p_free=0.25, p_occupied=0.85, prior=0.4, max_range_m=1.5, motion="linear")
+    model = SensorModel(p_free=0.25, p_occupied=0.85, prior=0.4, max_range_m=1.5)
     grid = OccupancyGrid(0.1, model=model, clamp=3.0)
     for _ in range(2):
         grid.integrate(CAMERA, random_disparity(rng), random_pose(rng))

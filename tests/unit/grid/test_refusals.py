@@ -38,7 +38,6 @@ def test_a_map_that_makes_no_sense_is_refused(options, culprit):
     ("options", "culprit"),
     [
         ({"form": "typed"}, "'typed'; choose from: corrected, printed"),
-        ({"motion": "max"}, "'max'; choose from: linear, rss"),
         ({"p_free": 0.6}, "p_free 0.6"),
         ({"prior": np.nan}, "prior nan"),
         ({"max_range_m": np.inf}, "max_range_m"),
@@ -124,3 +123,8 @@ def test_an_image_of_one_row_is_refused():
 def test_a_weight_that_is_no_share_is_refused(weight):
     with pytest.raises(InvalidInputError, match="weight"):
         empty().integrate(CAMERA, wall(2.0), FORWARD, weight=weight)
+
+
+def test_a_motion_rule_that_there_is_not_is_refused_with_the_choices():
+    with pytest.raises(InvalidInputError, match="no motion rule named 'max'; choose from: linear, rss"):
+        empty().integrate(CAMERA, wall(1.0), FORWARD, 0.1, motion_rule="max")

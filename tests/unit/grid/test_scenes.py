@@ -205,14 +205,14 @@ def test_a_motion_error_of_half_a_metre_leaves_little_of_a_hit():
 def test_the_linear_sum_is_never_narrower_than_the_root_of_squares(seed, eps_m):
     rng = np.random.default_rng(seed)
     d, sigma = rng.uniform(0.5, 30, 50), rng.uniform(0.05, 2, 50)
-    linear, rss = (widened_sigma_px(CAMERA, d, sigma, motion_sigma_m=eps_m, motion=m) for m in ("linear", "rss"))
+    linear, rss = (widened_sigma_px(CAMERA, d, sigma, motion_sigma_m=eps_m, motion_rule=m) for m in ("linear", "rss"))
     assert (linear >= rss * (1 - 1e-12)).all()
     assert (rss >= np.maximum(sigma, eps_m * d**2 / CAMERA.focal_baseline_px_m) * (1 - 1e-12)).all()
 
 
 def test_the_linear_rule_of_the_motion_error_claims_less_at_the_surface():
-    linear, rss = (empty(model=replace(MODEL, motion=rule)) for rule in ("linear", "rss"))
-    for grid in (linear, rss):
-        grid.integrate(CAMERA, wall(1.7, 0.3), FORWARD, motion_sigma_m=0.1)
+    linear, rss = empty(), empty()
+    for grid, rule in ((linear, "linear"), (rss, "rss")):
+        grid.integrate(CAMERA, wall(1.7, 0.3), FORWARD, motion_sigma_m=0.1, motion_rule=rule)
     hit = [[1.7, 0.05, 0.05]]
     assert linear.probability(hit) < rss.probability(hit)

@@ -28,8 +28,8 @@ models = st.builds(
     p_occupied=st.floats(0.81, 0.98),
     prior=st.floats(0.2, 0.8),
     max_range_m=st.floats(0.8, 3.0),
-    motion=st.sampled_from(["rss", "linear"]),
 )
+rules = st.sampled_from(["rss", "linear"])
 
 
 def seen(seed, correlation_px, camera=SMALL):
@@ -48,7 +48,7 @@ def all_cells(learnt):
     return cells.reshape(-1, 3), evidence.ravel()
 
 
-def twin_readings(disparity, model, eps_m, camera=SMALL):
+def twin_readings(disparity, model, eps_m, camera=SMALL, motion_rule="rss"):
     found = twins.levels(
         disparity.disparity_px,
         disparity.sigma_px,
@@ -57,16 +57,16 @@ def twin_readings(disparity, model, eps_m, camera=SMALL):
         steepest=pyramid.STEEPEST,
     )
     options = {"correlation_px": disparity.correlation_px, "eps_m": eps_m, "relief_of_noise": pyramid.RELIEF_OF_NOISE}
-    options["least_certainty"] = pyramid.LEAST_CERTAINTY
+    options |= {"least_certainty": pyramid.LEAST_CERTAINTY, "motion_rule": motion_rule}
     return [twins.readings(level, camera, model, **options) for level in found]
 
 
-@given(seed=seeds, correlation_px=lengths, model=models, eps_m=st.sampled_from([0.0, 0.05]))
+@given(seed=seeds, correlation_px=lengths, model=models, eps_m=st.sampled_from([0.0, 0.05]), rule=rules)
 @settings(max_examples=20, deadline=None, derandomize=True)
-def test_the_pyramid_agrees_with_its_twin(seed, correlation_px, model, eps_m):
+def test_the_pyramid_agrees_with_its_twin(seed, correlation_px, model, eps_m, rule):
     disparity, _ = seen(seed, correlation_px)
-    made = pyramid.Pyramid.of(SMALL, disparity, model, motion_sigma_m=eps_m)
-    expected = twin_readings(disparity, model, eps_m)
+    made = pyramid.Pyramid.of(SMALL, disparity, model, motion_sigma_m=eps_m, motion_rule=rule)
+    expected = twin_readings(disparity, model, eps_m, motion_rule=rule)
     assert len(expected) == len(made.layout)
     halves = made.nodes.view(np.int32)[:, 1]
     q, r = ((bits.astype(np.int32)).view(np.float32) for bits in (halves & -65536, halves << 16))

@@ -96,14 +96,14 @@ def bfloat16(x):
     return bits.astype(np.int32).view(np.float32).astype(np.float64)
 
 
-def readings(level, camera, model, *, correlation_px, eps_m, relief_of_noise, least_certainty):
+def readings(level, camera, model, *, correlation_px, eps_m, relief_of_noise, least_certainty, motion_rule="rss"):
     """d, width of d and relief of d of the nodes of a level, each (h, w) [px]; NaN where invalid."""
     d, sigma, between, pixels = np.moveaxis(level, -1, 0)
     looks = np.maximum(pixels / correlation_px**2, 1)
     of_child = np.maximum(pixels / 4 / correlation_px**2, 1)
     motion = eps_m * d**2 / camera.focal_baseline_px_m
     width = sigma / np.sqrt(looks)
-    width = width + motion if model.motion == "linear" else np.hypot(width, motion)
+    width = width + motion if motion_rule == "linear" else np.hypot(width, motion)
     noise = (relief_of_noise[0] + relief_of_noise[1] * (1 - 1 / looks)) * sigma**2 / of_child
     relief = 2 * np.sqrt(np.maximum(between - noise, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -174,3 +174,13 @@ def overlaps(x_px, node_px, first, side):
         np.clip(np.minimum(inside + half, n + 0.5) - np.maximum(inside - half, n - 0.5), 0, None) for n in (0, 1)
     ]
     return np.array(lengths) / np.sum(lengths, axis=0)
+
+
+# The mean over poses
+
+
+def mean_over_poses(told, weights, weight):
+    """Evidence [nat] (N,) of the mean ratio of poses that tell (K, N) [nat], NaN = nothing; nothing where all do."""
+    # Ratios of e^128 are no trouble to float64.
+    ratios = np.exp(np.where(np.isnan(told), 0.0, told))
+    return np.where(np.isnan(told).all(axis=0), np.nan, weight * np.log(np.asarray(weights) @ ratios))

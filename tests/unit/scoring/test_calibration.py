@@ -5,7 +5,15 @@ from hypothesis import strategies as st
 
 from stereogrid.errors import InvalidInputError
 from stereogrid.scoring import bound_coverage, reliability_table
-from stereogrid.scoring.calibration import CLIP, calibration_scores, entropy_bit, log_loss
+from stereogrid.scoring.calibration import (
+    CLIP,
+    calibration_scores,
+    covered,
+    entropy_bit,
+    in_sigmas,
+    log_loss,
+    stretch,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -106,6 +114,21 @@ def test_hits_without_a_range_are_left_out_of_the_bound():
     score = bound_coverage(np.array([1, 1, np.nan]), np.array([1.1, 2, 1]), np.array([0.1, 0.1, 0.1]))
     assert (score.value, score.n) == (0.5, 2)
     assert np.isnan(bound_coverage(np.array([np.nan]), np.ones(1), np.ones(1)).value)
+
+
+def test_the_stretch_of_a_bound_is_what_would_make_it_right():
+    sigmas = np.abs(np.random.default_rng(0).normal(size=100_000))
+    assert stretch(3 * sigmas) == pytest.approx(3, abs=0.03)
+    assert covered(3 * sigmas / stretch(3 * sigmas))[0] == pytest.approx(0.95, abs=1e-4)
+    assert stretch(np.append(sigmas, np.nan)) == stretch(sigmas)
+    assert np.isnan(stretch(np.empty(0)))
+    assert np.isnan(stretch(np.array([1.0, np.inf]))), "no factor covers an error without a bound"
+
+
+def test_no_error_where_none_is_claimed_says_nothing_and_an_error_there_has_no_bound():
+    sigmas = in_sigmas(np.array([0.0, -1.0, -3.0]), np.array([0.0, 0.0, 2.0]))
+    np.testing.assert_equal(sigmas, [np.nan, np.inf, 1.5])
+    assert covered(sigmas) == (0.5, 2)
 
 
 def test_ranges_of_different_shapes_are_refused():

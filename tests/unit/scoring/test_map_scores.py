@@ -16,6 +16,7 @@ from stereogrid.scoring import (
     sample_cells,
     score_map,
 )
+from stereogrid.scoring.surface import SeenSurface
 
 CELL_M = 0.1
 
@@ -52,7 +53,9 @@ def noisy(labels, seed=0):
 
 
 def test_every_score_is_in_the_table_with_its_unit(labels, visible, mesh, camera, array_map):
-    scores = score_map(array_map(labels, noisy(labels)), labels, visible, mesh=mesh, camera=camera)
+    scores = score_map(
+        array_map(labels, noisy(labels)), labels, visible, seen=SeenSurface.of(mesh, labels, visible), camera=camera
+    )
     assert [(s.name, s.unit) for s in scores] == [(name, unit) for name, (unit, _) in SCORE_NAMES.items()]
     assert np.isfinite([s.value for s in scores]).all()
 
@@ -64,7 +67,7 @@ def test_the_surface_is_scored_only_against_a_mesh(labels, visible, array_map):
 
 def test_the_perfect_map_is_perfect(labels, visible, mesh, array_map):
     perfect = array_map(labels, (labels.label == OCCUPIED).astype(float))
-    scores = values(score_map(perfect, labels, visible, mesh=mesh))
+    scores = values(score_map(perfect, labels, visible, seen=SeenSurface.of(mesh, labels, visible)))
     for name in ("auc", "average_precision", "occupied_f1", "occupied_iou", "coverage", "cell_accuracy"):
         assert scores[name] == 1
     for name in ("brier", "brier_balanced", "ece_width", "ece_count", "unsafe_occupied", "entropy"):
@@ -83,7 +86,14 @@ def test_the_prior_alone_ranks_nothing(labels, visible, array_map):
 
 
 def test_an_empty_map_is_the_prior_over_all_and_undefined_where_touched(labels, visible, mesh, array_map):
-    scores = values(score_map(array_map(labels, np.full(labels.label.shape, np.nan)), labels, visible, mesh=mesh))
+    scores = values(
+        score_map(
+            array_map(labels, np.full(labels.label.shape, np.nan)),
+            labels,
+            visible,
+            seen=SeenSurface.of(mesh, labels, visible),
+        )
+    )
     assert scores["coverage"] == 0 and scores["auc_all"] == 0.5 and scores["brier_all"] == pytest.approx(0.25)
     assert np.isnan(scores["auc"]) and np.isnan(scores["brier"]) and np.isnan(scores["accuracy_m"])
 
@@ -148,14 +158,18 @@ def test_scores_do_not_change_when_the_world_is_rotated(labels, visible, mesh, c
     assert np.array_equal(turned.label, np.rot90(labels.label))
     seen = VisibleSet(np.rot90(visible.nearest_m), np.rot90(visible.in_view))
     p = noisy(labels)
-    before = score_map(array_map(labels, p), labels, visible, mesh=mesh, camera=camera)
-    after = score_map(array_map(turned, np.rot90(p)), turned, seen, mesh=turned_mesh, camera=camera)
+    before = score_map(array_map(labels, p), labels, visible, seen=SeenSurface.of(mesh, labels, visible), camera=camera)
+    after = score_map(
+        array_map(turned, np.rot90(p)), turned, seen, seen=SeenSurface.of(turned_mesh, turned, seen), camera=camera
+    )
     assert values(after) == pytest.approx(values(before), rel=1e-6, abs=1e-9)
 
 
 def test_scores_are_the_same_run_after_run(labels, visible, mesh, array_map):
     grid = array_map(labels, noisy(labels))
-    assert score_map(grid, labels, visible, mesh=mesh) == score_map(grid, labels, visible, mesh=mesh)
+    assert score_map(grid, labels, visible, seen=SeenSurface.of(mesh, labels, visible)) == score_map(
+        grid, labels, visible, seen=SeenSurface.of(mesh, labels, visible)
+    )
 
 
 def test_the_reliability_diagram_counts_the_touched_visible_cells(labels, visible, array_map):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from stereogrid.errors import InvalidInputError, RecordingError, StereogridError
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
-from stereogrid.scoring import SCORE_NAMES
+from stereogrid.scoring import SCORE_NAMES, scores_to_dict
 from stereogrid.scoring.labels import OCCUPIED, label_cells
 from stereogrid.scoring.truth import KnowsTruth, MapTruth, load_ply
 
@@ -194,3 +194,16 @@ def test_what_is_no_ply_is_refused(ply):
 def test_an_empty_mesh_has_no_labels():
     with pytest.raises(InvalidInputError, match="no faces"):
         label_cells(trimesh.Trimesh(), CELL_M)
+
+
+def test_labels_around_the_path_alone_see_and_score_the_same(camera, wall, box, array_map):
+    far = trimesh.util.concatenate([wall, box([14, -1, -1], [15, 1, 1])])
+    poses = np.stack([FORWARD, from_rotation(R_BASE_OPTICAL, [0.2, 0.1, 0])])
+    whole, part = (
+        MapTruth.of_recording(Drive(camera, far, poses), CELL_M, max_range_m=5, around_path=around)
+        for around in (False, True)
+    )
+    assert part.labels.label.size < 0.5 * whole.labels.label.size
+    every = array_map(whole.labels, np.random.default_rng(0).random(whole.labels.label.shape))
+    assert scores_to_dict(part.score(every)) == scores_to_dict(whole.score(every))
+    assert by_name(part.score(every))["coverage"] == 1
