@@ -16,7 +16,7 @@ WHOLE, PART = "0.45", "0.82"
 
 
 def budget_figure(budget: Budget, errors: Sequence[Error] = ERRORS) -> Figure:
-    """Bars of what each cause gains or costs, with intervals over the units; marks of the worlds; and the ladder."""
+    """Bars of what each cause gains or costs, with intervals over the seeds; marks of the worlds; and the ladder."""
     figure = Figure(figsize=(13.5, 3.6 * len(errors) + 0.6), layout="constrained")
     panels = figure.subplots(len(errors), 3, squeeze=False, width_ratios=[1.15, 1, 1])
     (gain, gains), (cost, costs) = budget.readings.items()

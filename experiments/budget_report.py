@@ -1,23 +1,21 @@
 """What an error budget leaves in its run folder."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import isfinite, isnan
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from stereogrid.figures import save_figure
-from stereogrid.files import written_beside
 from stereogrid.geometry import FloatArray
 from stereogrid.report import ReportFigure, ReportTable, write_metrics, write_report
 from stereogrid.scoring import SCORE_NAMES, Score
-from stereogrid.scoring.paired import Interval
+from stereogrid.scoring.paired import Interval, hierarchical_mean
 
 from .budget_arms import REAL, Arm, Step, ladder, made_real, made_true
-from .compared import Compared, interval_text, plain
-from .matchers_report import write_tidy
+from .compared import BOOTSTRAP_SEED, Compared, interval_text, plain
+from .tidy import write_scores, write_table
 
 Unit = tuple[str, int]
 """World and seed."""
@@ -92,15 +90,19 @@ class Budget:
         return error.of(self.compared.values(arm, error.score))
 
     def gap(self, step: Step, error: Error) -> Interval:
-        """The error of the step's worse arm less that of the better, with an interval over the units."""
-        worse, better = (step.better, step.worse) if error.lacks else (step.worse, step.better)
-        return self.compared.between(worse, better, error.score)
+        """The error of the step's worse arm less that of the better, over these worlds, with other seeds."""
+        by_world = list(self._gaps(step, error).values())
+        return hierarchical_mean(by_world, rng=np.random.default_rng(BOOTSTRAP_SEED)).these_worlds
 
     def by_world(self, step: Step, error: Error) -> dict[str, float]:
         """The same of each world alone."""
+        return {world: float(gaps.mean()) for world, gaps in self._gaps(step, error).items()}
+
+    def _gaps(self, step: Step, error: Error) -> dict[str, FloatArray]:
+        """Of each world: the difference for each seed."""
         gaps = self.error(step.worse, error) - self.error(step.better, error)
-        worlds = [world for world, _ in self.scores[REAL]]
-        return {name: float(gaps[[world == name for world in worlds]].mean()) for name in dict.fromkeys(worlds)}
+        worlds = np.array([world for world, _ in self.scores[REAL]])
+        return {name: gaps[worlds == name] for name in dict.fromkeys(worlds.tolist())}
 
 
 def write_results(folder: Path, budget: Budget, *, facts: Mapping[str, str]) -> list[ReportTable]:
@@ -112,8 +114,8 @@ def write_results(folder: Path, budget: Budget, *, facts: Mapping[str, str]) -> 
     write_numbers(folder, budget, facts)
     figure = save_figure(budget_figure(budget), folder / "budget.png", dots_per_inch=110)
     caption = (
-        "Bars: mean over the units with its 95 % interval; marks: the worlds. Left, what mending a cause alone gains; "
-        "middle, what it costs when all else is perfect; right, one cause after the other made true."
+        "Bars: mean over the worlds with its 95 % interval for other seeds; marks: the worlds. Left, what mending a "
+        "cause alone gains; middle, what it costs when all else is perfect; right, one cause after the other made true."
     )
     write_report(
         folder,
@@ -136,7 +138,7 @@ def reading_table(budget: Budget, reading: str) -> ReportTable:
         for step in budget.readings[reading]
     ]
     note = (
-        f"Means over {budget.compared.n_units} {UNITS} with bootstrap 95 % intervals over them, which are not "
+        f"Means over {budget.compared.n_units} {UNITS} with bootstrap 95 % intervals for other seeds, which are not "
         "corrected for their number and say nothing of other worlds. Indented: parts of the row above, or more of it."
     )
     return ReportTable(f"Error by cause, {reading}", ["cause", *(error.label for error in ERRORS)], rows, note=note)
@@ -154,19 +156,15 @@ def write_numbers(folder: Path, budget: Budget, facts: Mapping[str, str]) -> Non
     flat = {
         (world, seed, arm): scores for arm, units in budget.scores.items() for (world, seed), scores in units.items()
     }
-    write_tidy(folder / "scores.csv", ("world", "seed", "arm"), flat)
+    write_scores(folder / "scores.csv", ("world", "seed", "arm"), flat)
     steps = {
         (reading, step.what, error.label): asdict(budget.gap(step, error))
         for reading, lines in budget.readings.items()
         for step in lines
         for error in ERRORS
     }
-    with written_beside(folder / "budget.csv") as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["reading", "cause", "error", "mean", "low", "high", "n"])
-        writer.writerows(
-            [*key, *("" if isnan(value) else value for value in gap.values())] for key, gap in steps.items()
-        )
+    header = ["reading", "cause", "error", "mean", "low", "high", "n"]
+    write_table(folder / "budget.csv", header, ([*key, *gap.values()] for key, gap in steps.items()))
     nested = {
         " | ".join(key): {name: value if isfinite(value) else None for name, value in gap.items()}
         for key, gap in steps.items()

@@ -16,7 +16,6 @@ from .drives import DriveConfig
 SCORED, TUNING = ("corridor", "office", "entrance"), ("warehouse", "outdoor")
 NONE = "none"
 SUM_OF_RAYS = "sum_of_rays"
-POSE_RAY_SEEDS = 6
 SIZES = ("position_m", "heading_rad", "along", "across", "heading", "turn")
 """The fields of a MotionError that say how large the error is; the others say what a map makes of it."""
 
@@ -61,8 +60,7 @@ class Arm:
 
 def arm_of(way: str) -> Arm:
     """The common mapping with this way of stereogrid.motion.WAYS."""
-    # A map takes "pose" 20 s of CPU by that rule: every ray from up to nine places.
-    return Arm(way, {"motion_error": {"way": way}}, ray_seeds=POSE_RAY_SEEDS if way == "pose" else 0)
+    return Arm(way, {"motion_error": {"way": way}})
 
 
 @dataclass(frozen=True)

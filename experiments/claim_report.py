@@ -1,17 +1,16 @@
 """What the test of the claim leaves in its run folder, and what of it is fit for the documentation."""
 
 import csv
-import math
 import shutil
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
 from stereogrid.errors import InvalidInputError
 from stereogrid.figures import save_figure
-from stereogrid.files import written_beside
 from stereogrid.report import ReportFigure, ReportTable, write_report
 from stereogrid.scoring import BOUND_NAMES, Score
+from stereogrid.scoring.paired import Interval
 
 from .claim_bins import PREFIX
 from .claim_calibration import Calibrations, calibration_table, calibrations
@@ -34,24 +33,14 @@ from .claim_tables import (
 )
 from .claim_units import END_ERROR, Unit
 from .drives import OBSTACLE_MEANINGS
-from .matchers_report import write_tidy
 from .parallel import Stage
+from .tidy import write_scores, write_table
 
 KEYS = ("world", "noise", "seed", "fusion", "way")
 CALIBRATION = "calibration.csv"
 FLOOR = "floor_"
 """Scores of the voxelised mesh: the same for every map of a world."""
-PUBLISHED = (
-    "auc",
-    "log_loss",
-    *CORE,
-    "log_loss_balanced",
-    "ece_width",
-    "occupied_f1",
-    "obstacle_auc",
-    COVERED[0],
-    END_ERROR,
-)
+PUBLISHED = (*CORE, "obstacle_auc", COVERED[0])
 SUMMARY = (
     "Does it make better maps when the mapper is told how far the poses may be off, and what it should make of that? "
     "Every arm maps the same drives, with the same images and the same noise of the poses, seed by seed; the noise is "
@@ -114,13 +103,9 @@ def write_tuning(folder: Path, config: ClaimConfig, found: Results, *, command: 
     write_units(folder / "tune.csv", found)
     means = tuning_means(config, Values(found))
     table = tuning_table(config, means)
-    with (
-        written_beside(folder / "candidates.csv") as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(["noise", "fusion", "candidate", "score", "mean"])
-        writer.writerows([*asdict(cell).values(), f"{mean:.6g}"] for cell, mean in means.items())
+    header = ["noise", "fusion", "candidate", "score", "mean"]
+    lines = ([*asdict(cell).values(), mean] for cell, mean in means.items())
+    write_table(folder / "candidates.csv", header, lines, digits=6)
     facts = {"command": command}
     title, summary = "Candidates for the claim", "On worlds that the claim is not scored on."
     write_report(folder, title, summary=summary, arms={}, figures=[], facts=facts, tables=[table])
@@ -158,41 +143,40 @@ def draw(folder: Path, config: ClaimConfig, values: Values, differences: Differe
     return figures
 
 
-def write_units(path: Path, found: Results, only: Iterable[str] = ()) -> None:
+def write_units(path: Path, found: Results, only: Iterable[str] = (), *, digits: int = 17) -> None:
     """A line a score of a unit; `only` some of the scores, if any are named."""
     wanted = {*only}
-    write_tidy(
+    write_scores(
         path,
         KEYS,
         {
             tuple(asdict(unit).values()): [each for each in scores if not wanted or each.name in wanted]
             for unit, scores in found.items()
         },
+        digits=digits,
     )
 
 
 def write_summary(path: Path, differences: Iterable[Difference]) -> None:
     """A line a difference, with its interval."""
-    with written_beside(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["noise", "fusion", "way", "score", "world", "difference", "low", "high", "n", "p_holm"])
-        for each in differences:
-            numbers = (each.interval.mean, each.interval.low, each.interval.high)
-            row = ["" if math.isnan(number) else f"{number:.6g}" for number in (*numbers, each.p)]
-            writer.writerow([*asdict(each.cell).values(), each.world, *row[:3], each.interval.n, row[3]])
+    header = ["noise", "fusion", "way", "score", "world", "difference", "low", "high", "n", "p_holm"]
+    lines = ([*asdict(each.cell).values(), each.world, *_numbers(each.interval), each.p] for each in differences)
+    write_table(path, header, lines, digits=6)
 
 
 def write_calibrations(path: Path, found: Calibrations) -> None:
     """A line an arm and world: ECE over the seeds, and its difference from the reference arm's with its interval."""
-    with written_beside(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["noise", "fusion", "way", "world", "ece", "difference", "low", "high", "n"])
-        for arm, calibration in found.items():
-            for world, error in calibration.error.items():
-                interval = calibration.difference[world]
-                numbers = (error, interval.mean, interval.low, interval.high)
-                row = ["" if math.isnan(number) else f"{number:.6g}" for number in numbers]
-                writer.writerow([*arm, world, *row, interval.n])
+    lines = (
+        [*arm, world, error, *_numbers(calibration.difference[world])]
+        for arm, calibration in found.items()
+        for world, error in calibration.error.items()
+    )
+    header = ["noise", "fusion", "way", "world", "ece", "difference", "low", "high", "n"]
+    write_table(path, header, lines, digits=6)
+
+
+def _numbers(interval: Interval) -> tuple[float, float, float, int]:
+    return interval.mean, interval.low, interval.high, interval.n
 
 
 def check_place(place: Path) -> None:
@@ -213,13 +197,11 @@ def publish_results(folder: Path, found: Results, place: Path) -> None:
             shutil.copyfile(folder / name, place / name)
     except OSError as error:
         raise InvalidInputError(f"{place}: nothing can be written there ({error.strerror})") from None
-    rounded = {unit: [replace(s, value=float(f"{s.value:.6g}")) for s in scores] for unit, scores in found.items()}
-    write_units(place / "claim.csv", rounded, PUBLISHED)
+    write_units(place / "claim.csv", found, PUBLISHED, digits=4)
     shown = {*HEADLINE, *BOUND_NAMES}
     with (folder / "summary.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
-    with written_beside(place / "summary.csv") as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([rows[0], *(row for row in rows[1:] if row[3] in shown)])
+    write_table(place / "summary.csv", rows[0], (row for row in rows[1:] if row[3] in shown))
 
 
 def left_out(failed: Mapping[Unit, str]) -> str:

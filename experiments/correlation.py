@@ -5,7 +5,6 @@ are flatter and their noise kinder than any camera's. What changes from frame to
 stands still, and what motion does to the error of a surface point on simulated drives, where every point is known.
 """
 
-import csv
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,6 +32,7 @@ from .correlation_scenes import SLOW, scene_errors, scenes, short_drives, static
 from .parallel import Stage, in_parallel
 from .sigma import WITHOUT_TABLE
 from .sigma_scenes import Scene
+from .tidy import write_rows
 
 LENGTHS = Path(stereogrid.matching.correlation.__file__).with_name("correlation_lengths.json")
 COMMAND = "python -m experiments correlation --data ../shared/data --write"
@@ -194,9 +194,6 @@ def _write_results(
     rho = {name: {row: a.radial.tolist() for row, a in each.rho.items()} for name, each in found.items()}
     whole = {"matchers": dict(reaches), "means": means, "rows": rows, "motion": motion, "rho": rho}
     write_metrics(folder, {"command": command, **_plain(whole)})
-    with (folder / "lengths.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
+    write_rows(folder / "lengths.csv", rows)
     save_figure(rho_figure({name: each.rho for name, each in found.items()}), folder / "rho.png")
     save_figure(motion_figure({name: each.motion for name, each in found.items()}), folder / "motion.png")

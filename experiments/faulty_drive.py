@@ -21,7 +21,7 @@ Reading = tuple[Observation, Disparity]
 
 
 @dataclass(frozen=True)
-class Kept:
+class HeldRecording:
     """A recording whose observations are kept in memory."""
 
     camera: StereoCamera
@@ -78,17 +78,17 @@ class FaultyDrive:
         return FaultyCameras(self._late if images else self._clean, faults, self.seed)
 
     @cached_property
-    def _clean(self) -> Kept:
-        return Kept(self.drive.camera, self.drive.T_base_cam, list(self.drive))
+    def _clean(self) -> HeldRecording:
+        return HeldRecording(self.drive.camera, self.drive.T_base_cam, list(self.drive))
 
     @cached_property
-    def _late(self) -> Kept:
+    def _late(self) -> HeldRecording:
         """The pictures taken when the cameras take them: to draw them takes longest, and all arms share them."""
         when = replace(
             CameraFaults(), time_skew_s=self.faults.time_skew_s, rolling_shutter_s=self.faults.rolling_shutter_s
         )
         seen = FaultyCameras(self.drive, when, self.seed)
-        return Kept(seen.camera, seen.T_base_cam, list(seen)) if when.needs_motion else self._clean
+        return HeldRecording(seen.camera, seen.T_base_cam, list(seen)) if when.needs_motion else self._clean
 
 
 def displaced_disparity(camera: StereoCamera, observation: Observation, R_calibrated_true: FloatArray) -> Disparity:

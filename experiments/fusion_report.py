@@ -16,7 +16,7 @@ from .compared import Compared, difference_table, mean_table
 from .drives import OBSTACLE_MEANINGS
 from .fusion_arms import FIRST, MEASURED, ONE_LOOK, SUM
 from .fusion_figures import arms_figure
-from .matchers_report import write_tidy
+from .tidy import write_scores
 
 SIMULATED, REAL, CLAMPS = "simulated", "real", "clamps"
 IN_FIGURE = {
@@ -80,7 +80,7 @@ def write_numbers(folder: Path, every: Sequence[Compared], facts: Mapping[str, s
         for arm, units in world.scores.items()
         for unit, scores in units.items()
     }
-    write_tidy(folder / "scores.csv", ("world", "arm", "repeat"), flat)
+    write_scores(folder / "scores.csv", ("world", "arm", "repeat"), flat)
     metrics = {
         world.name: {
             "reference": world.reference,

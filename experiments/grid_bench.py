@@ -3,7 +3,6 @@
 The rows travel in the extra_info of pytest-benchmark's JSON, so any table or figure can be made anew from it.
 """
 
-import csv
 import json
 import shutil
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from stereogrid.report import ReportTable, environment
 from stereogrid.runs import finished_path, run_folder
 
 from .grid_bench_figure import bench_figure
+from .tidy import write_rows
 
 OURS, OCTOMAP = "stereogrid", "octomap"
 FIGURE_DPI = 110
@@ -111,7 +111,7 @@ def run(path: Path, *, runs: Path, picture: Path | None = None) -> tuple[Path, l
     tables = bench_tables(rows)
     with run_folder(runs, "bench") as folder:
         shutil.copyfile(path, folder / "bench.json")
-        _write_csv(rows, folder / "bench.csv")
+        write_rows(folder / "bench.csv", [plain(row) for row in rows])
         text = "\n".join([_measured(json.loads(path.read_text(encoding="utf-8"))), *(t.markdown for t in tables)])
         (folder / "tables.md").write_text(text, encoding="utf-8")
         figure = bench_figure(of(rows, SpeedRow), of(rows, GrowthRow), growth_of=GROWTH_OF)
@@ -220,11 +220,3 @@ def _measured(bench: Mapping[str, Any]) -> str:
         f"{facts['machine']}, Python {facts['python']}, commit {str(commit.get('id', 'unknown'))[:10]}{changed}; "
         f"{facts['versions']}.\n"
     )
-
-
-def _write_csv(rows: Sequence[Row], path: Path) -> None:
-    infos = [plain(row) for row in rows]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(dict.fromkeys(name for info in infos for name in info)))
-        writer.writeheader()
-        writer.writerows(infos)

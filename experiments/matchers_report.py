@@ -1,8 +1,7 @@
 """What a comparison of matchers leaves in its run folder."""
 
-import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from stereogrid.files import written_beside
 from stereogrid.report import ReportFigure, ReportTable, environment, write_metrics, write_report
-from stereogrid.scoring import Score, scores_to_dict
+from stereogrid.scoring import scores_to_dict
 from stereogrid.scoring.paired import Interval
 
 from .drives import OBSTACLE_MEANINGS
@@ -18,6 +17,7 @@ from .matched_maps import DENSITY, SHOWN, MapResult
 from .matched_pairs import PairResult
 from .matchers_figures import draw_maps, draw_pairs, pair_slug
 from .matchers_tables import full_pair_tables, map_tables, screen_tables, short_pair_table
+from .tidy import write_scores
 
 NO_PAIRS = "No pairs of known disparity were given (--pairs, or $STEREOGRID_DATA/stereo): only maps are compared. "
 SUMMARY = (
@@ -70,8 +70,8 @@ def write_numbers(
     of_pairs = {(r.pair.name, r.contender): r.scores for r in on_pairs}
     of_maps = {(name, seed): scores for name, seeds in by_map.scores.items() for seed, scores in seeds.items()}
     if of_pairs:
-        write_tidy(folder / "pairs.csv", ("pair", "matcher"), of_pairs)
-    write_tidy(folder / "maps.csv", ("matcher", "seed"), of_maps)
+        write_scores(folder / "pairs.csv", ("pair", "matcher"), of_pairs)
+    write_scores(folder / "maps.csv", ("matcher", "seed"), of_maps)
     others = [name for name in by_map.scores if name != reference]
     metrics = {
         "facts": facts,
@@ -84,17 +84,6 @@ def write_numbers(
         },
     }
     write_metrics(folder, metrics)
-
-
-def write_tidy(path: Path, keys: Sequence[str], scores: Mapping[tuple[object, ...], Iterable[Score]]) -> None:
-    """A CSV file with a line a score: the keys' values, then score, value, unit, n; an undefined value is empty."""
-    with written_beside(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*keys, "score", "value", "unit", "n"])
-        for key, row in scores.items():
-            for each in row:
-                value = "" if math.isnan(each.value) else repr(each.value)
-                writer.writerow([*key, each.name, value, each.unit, each.n])
 
 
 def _nested(flat: Mapping[tuple[str, str], object]) -> dict[str, dict[str, object]]:

@@ -1,6 +1,5 @@
 """What the experiment on the motion error leaves in its run folder."""
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from stereogrid.motion.parameters import UNITS, Parameter, parameters
 from stereogrid.report import ReportFigure, ReportTable, write_metrics, write_report
 
 from .motion_figures import recovery_figure, surfaces_figure
+from .tidy import write_rows
 
 SUMMARY = (
     "Straight lines of 5 m with a mark each metre and turns on the spot with a mark each quarter, half of them each "
@@ -62,7 +62,7 @@ def write_results(
         for name, fit in each.fits.items()
         for p in parameters(fit)
     ]
-    write_csv(folder / "recovery.csv", rows)
+    write_rows(folder / "recovery.csv", rows, digits=6)
     write_metrics(folder, {"facts": facts, "tables": [asdict(table) for table in tables]})
     write_report(
         folder,
@@ -86,15 +86,7 @@ def write_runs_and_fits(folder: Path, caused: Sequence[Caused]) -> None:
     for each in caused:
         save_config(each.fit.error, folder / f"motion-{each.faults}-{each.surface.replace(', ', '-')}.toml")
     rows = [{"surface": c.surface, "faults": c.faults, **asdict(p)} for c in caused for p in parameters(c.fit)]
-    write_csv(folder / "caused.csv", rows)
-
-
-def write_csv(path: Path, rows: Sequence[Mapping[str, object]]) -> None:
-    """Rows under the names of their values; numbers to six digits."""
-    with written_beside(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]) if rows else [])
-        writer.writeheader()
-        writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    write_rows(folder / "caused.csv", rows, digits=6)
 
 
 def draw(

@@ -16,8 +16,8 @@ from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import log_odds
 
 from .compared import Compared, interval_text, plain
-from .matchers_report import write_tidy
 from .printed_arms import ALL, CLAMP_MEANINGS, CORRECTED, FORMS, LOW_PRINTED, PRINTED, Peaks
+from .tidy import write_scores
 
 SHOWN = (
     "auc",
@@ -67,7 +67,7 @@ def write_results(folder: Path, findings: Findings, *, facts: Mapping[str, str])
     """Numbers, the figure and the report of the run; the tables for the screen."""
     tables = [scores_table(findings), differences_table(findings), eq2_table(findings), eq11_table(findings.peaks)]
     flat = {(arm, seed): scores for arm, seeds in findings.scores.items() for seed, scores in seeds.items()}
-    write_tidy(folder / "scores.csv", ("arm", "seed"), flat)
+    write_scores(folder / "scores.csv", ("arm", "seed"), flat)
     first = {arm: list(next(iter(seeds.values()))) for arm, seeds in findings.scores.items()}
     of_tables = {table.caption: [dict(zip(table.header, row, strict=True)) for row in table.rows] for table in tables}
     write_metrics(

@@ -4,7 +4,6 @@
 scenes out of the fit and counts on it; two more carry the tables from the real pairs to the synthetic ones and back.
 """
 
-import csv
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -27,6 +26,7 @@ from stereogrid.runs import finished_path, run_folder
 from .parallel import Stage, in_parallel
 from .sigma_fit import Coverage, Sample, coverage, fit
 from .sigma_scenes import Scene, scenes
+from .tidy import write_rows
 
 TABLES = Path(stereogrid.matching.sigma.__file__).with_name("sigma_tables.json")
 COMMAND = "python -m experiments sigma --data ../shared/data --write"
@@ -159,10 +159,7 @@ def _write_results(folder: Path, rows: Iterable[Row], tables: Mapping[str, Sigma
     rows = list(rows)
     plain = [{k: round(v, 3) if isinstance(v, float) else v for k, v in asdict(row).items()} for row in rows]
     write_metrics(folder, {"command": command, "tables": {n: t.log_sigma for n, t in tables.items()}, "rows": plain})
-    with (folder / "coverage.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(plain[0]))
-        writer.writeheader()
-        writer.writerows(plain)
+    write_rows(folder / "coverage.csv", plain)
     save_figure(coverage_figure([row for row in rows if row.fitted_on == "the others"]), folder / "coverage.png")
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import InvalidInputError, unknown_name
 from ..geometry import FloatArray
+from ..intervals import Bounds, mean_bounds, spread_bounds
 from .error import Growth, MotionError
 from .growth_fit import RunSums, fit_growth
-from .intervals import Bounds, mean_bounds, spread_bounds
 from .legs import EXACT, LegsOf, Measured
 from .runs import Run, Runs
 

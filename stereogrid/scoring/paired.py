@@ -14,6 +14,7 @@ from scipy.stats import norm, t
 
 from ..errors import InvalidInputError
 from ..geometry import FloatArray, as_floats
+from ..intervals import mean_bounds
 
 RESAMPLES = 10_000
 
@@ -56,9 +57,7 @@ def bootstrap_mean(values: ArrayLike, *, rng: np.random.Generator, level: float 
     if n < 2:
         return Interval(mean, np.nan, np.nan, n)
     means = rng.choice(kept, size=(RESAMPLES, n)).mean(axis=1)
-    tail = norm.cdf(np.sqrt(n / (n - 1)) * t.ppf((1 - level) / 2, n - 1))
-    low, high = np.quantile(means, [tail, 1 - tail])
-    return Interval(mean, float(low), float(high), n)
+    return Interval(mean, *mean_bounds(means, n, level), n)
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from stereogrid.intervals import mean_bounds, spread_bounds
 from stereogrid.motion.growth_fit import RunSums, fit_growth
-from stereogrid.motion.intervals import mean_bounds, spread_bounds
 
 FIVE_M = np.ones(5)
 EXACT = np.zeros((5, 5))

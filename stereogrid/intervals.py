@@ -1,9 +1,9 @@
-"""Intervals of what is fitted to repeated runs, from fits to whole runs that are drawn again."""
+"""Bootstrap intervals: of a mean and of a spread, from what units that are drawn again give."""
 
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtrit
 
-from ..geometry import FloatArray
+from .geometry import FloatArray
 
 Bounds = tuple[float, float]
 
