@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test test-slow bench bench-grid bench-render lint types layers format wheel-check clean
+.PHONY: demo test test-slow test-vm bench bench-grid bench-render bench-stops lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -16,6 +16,10 @@ test: .venv/ready
 test-slow: .venv/ready
 	$(PYTHON) -m pytest -m slow
 
+# Real V4L2 devices, in a virtual machine; says which Debian packages it needs.
+test-vm: .venv/ready
+	$(PYTHON) tests/vm
+
 # Minutes on 2 cores; needs STEREOGRID_DATA, the folder of the real data.
 bench: bench-grid
 	$(PYTHON) -m experiments energy --pairs $(STEREOGRID_DATA)/stereo
@@ -26,6 +30,10 @@ bench-grid: .venv/ready
 	mkdir -p runs
 	$(PYTHON) -m pytest tests/bench/test_grid.py tests/bench/test_pipeline.py --benchmark-json=runs/bench.json --benchmark-columns=min,median,max,rounds -q
 	$(PYTHON) -m experiments grid-bench runs/bench.json
+
+# How long it takes until the robot stands, whatever stops it; a minute and a half.
+bench-stops: .venv/ready
+	$(PYTHON) tests/bench/stops.py
 
 # CPU time of the simulator's pictures and of a recorded drive; needs no data.
 bench-render: .venv/ready
@@ -57,8 +65,8 @@ $(UV):
 
 .venv/ready: $(UV) pyproject.toml
 	$(UV) venv --quiet --clear --python $(PYTHON_VERSION) .venv
-	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,score,test,oracle,bench,dev]"
+	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,hardware,view,score,test,oracle,bench,dev]"
 	touch $@
 
 clean:
-	rm -rf .venv $(BOOTSTRAP) dist build
+	rm -rf .venv $(BOOTSTRAP) .vm dist build

@@ -31,5 +31,6 @@ class Identity:
         """The names in a body. Raises ArcosError when it is no answer to SYNC2."""
         if body[:1] != bytes([IDENTITY]) or len(body) == 1:
             raise ArcosError("the body is no answer to SYNC2")
-        reader = Reader(body, 1)
+        # The last 0 is left out by some.
+        reader = Reader(body + b"\0", 1)
         return Identity(reader.text(), reader.text(), reader.text())

@@ -39,7 +39,12 @@ ROBOTS: dict[str, Robot] = {
 
 
 def robot_of(subclass: str) -> Robot:
-    """The factors of a subclass. Raises ArcosError, with the choices, for an unknown one."""
-    if subclass not in ROBOTS:
-        raise ArcosError(f"no robot of the subclass {subclass!r}; choose from: {', '.join(sorted(ROBOTS))}")
-    return ROBOTS[subclass]
+    """The factors of a subclass, in any case; one with what it carries, as p3at-sh-lms500, has those of p3at-sh.
+
+    Raises ArcosError, with the choices, for an unknown one.
+    """
+    name = subclass.strip().lower()
+    for known in sorted(ROBOTS, key=len, reverse=True):
+        if name == known or name.startswith(f"{known}-"):
+            return ROBOTS[known]
+    raise ArcosError(f"no robot of the subclass {subclass!r}; choose from: {', '.join(sorted(ROBOTS))}")

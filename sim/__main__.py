@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from stereogrid.cli import run, was_interrupted
-
-from .interrupts import undisturbed
+from stereogrid.interrupts import undisturbed
 
 WorldName = Annotated[str, typer.Argument(help="corridor, entrance, office, outdoor or warehouse.")]
 

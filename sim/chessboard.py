@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from stereogrid.calibration import Chessboard, StereoCalibration
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import InvalidInputError
-from stereogrid.files import written_beside
+from stereogrid.files import make_folder, written_beside
 from stereogrid.geometry import R_BASE_OPTICAL, FloatArray, from_rotation, inverse, transform
 from stereogrid.observation import Image
 from stereogrid.recording.images import encode_png
@@ -174,15 +174,10 @@ def write_pairs(session: ChessboardSession, folder: Path) -> int:
 
     Raises InvalidInputError when pictures of that name are there already.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InvalidInputError(f"{folder}: is no folder")
     there = sorted(folder.glob("left[0-9][0-9].*")) + sorted(folder.glob("right[0-9][0-9].*"))
     if there:
         raise InvalidInputError(f"{there[0]}: exists already; choose another folder")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"{folder}: cannot be made ({error.strerror})") from error
+    make_folder(folder)
     number = 0
     for number, pair in enumerate(session.pairs(), start=1):
         for side, image in zip(("left", "right"), pair, strict=True):

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InvalidInputError
-from .geometry import FloatArray, as_floats, as_pose
+from .geometry import FloatArray, as_floats, as_pose, from_rotation
 
+SIDES = ("left", "right")
 DISTORTION_SIZES = (4, 5, 8, 12, 14)
 """How many coefficients OpenCV's pinhole distortion may have."""
 
@@ -143,6 +144,13 @@ def _intrinsics(K: ArrayLike, distortion: ArrayLike, side: str) -> tuple[FloatAr
     return matrix, coefficients
 
 
+def _rotation(R: ArrayLike, side: str) -> FloatArray:
+    matrix = as_floats(R)
+    if matrix.shape != (3, 3):
+        raise InvalidInputError(f"the {side} R must be (3, 3), not {matrix.shape}")
+    return as_pose(from_rotation(matrix), f"the {side} R")[:3, :3]
+
+
 @dataclass(frozen=True)
 class Rectification:
     """Maps a raw, distorted pair to a rectified one.
@@ -168,7 +176,7 @@ class Rectification:
         Invalid pixels are cropped away (alpha = 0). Raises InvalidInputError when a number is missing or the
         right camera is not to the right of the left one.
         """
-        (K0, D0), (K1, D1) = (_intrinsics(*each) for each in zip(K, distortion, ("left", "right"), strict=True))
+        (K0, D0), (K1, D1) = (_intrinsics(*each) for each in zip(K, distortion, SIDES, strict=True))
         T = as_pose(T_right_left, "T_right_left")
         if not T[:3, 3].any():
             raise InvalidInputError("the two cameras stand at one place: T_right_left has no translation")
@@ -177,10 +185,29 @@ class Rectification:
         R0, R1, P0, P1, *_ = cv2.stereoRectify(K0, D0, K1, D1, size_px, R_right_left, t_m, alpha=0)
         if P1[0, 3] >= 0:
             raise InvalidInputError(f"the right camera is not to the right: baseline {-P1[0, 3] / P1[0, 0]:.4f} m")
-        camera = StereoCamera.from_projections(P0, P1, size_px)
-        left = cv2.initUndistortRectifyMap(K0, D0, R0, P0, size_px, cv2.CV_32FC1)
-        right = cv2.initUndistortRectifyMap(K1, D1, R1, P1, size_px, cv2.CV_32FC1)
-        return cls(camera, R0, tuple(left), tuple(right))
+        return cls.from_matrices((K0, K1), (D0, D1), (R0, R1), (P0, P1), size_px)
+
+    @classmethod
+    def from_matrices(
+        cls,
+        K: tuple[ArrayLike, ArrayLike],
+        distortion: tuple[ArrayLike, ArrayLike],
+        R: tuple[ArrayLike, ArrayLike],
+        P: tuple[ArrayLike, ArrayLike],
+        size_px: tuple[int, int],
+    ) -> "Rectification":
+        """From what ROS calls K (3, 3), D, R (3, 3) and P (3, 4) of the (left, right) camera, and (width, height).
+
+        Raises InvalidInputError when a number is missing or these are not the matrices of one pair.
+        """
+        camera = StereoCamera.from_projections(*P, size_px)
+        turns = [_rotation(each, side) for each, side in zip(R, SIDES, strict=True)]
+        numbers = [_intrinsics(*each) for each in zip(K, distortion, SIDES, strict=True)]
+        left, right = (
+            cv2.initUndistortRectifyMap(*each, turn, as_floats(projection), size_px, cv2.CV_32FC1)
+            for each, turn, projection in zip(numbers, turns, P, strict=True)
+        )
+        return cls(camera, turns[0], tuple(left), tuple(right))
 
     def rectify(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """The rectified pair, each (H, W) uint8."""

@@ -18,7 +18,9 @@ from .errors import InvalidInputError, StereogridError
 from .motion_cli import motion_error
 
 if TYPE_CHECKING:
+    from .camera import StereoCamera
     from .config import MappingConfig, MatcherConfig
+    from .observation import Recording
     from .scoring import Score
 
 # What takes seconds to import (Numba, OpenCV, matplotlib) is imported by the commands that need it: --help and errors
@@ -53,21 +55,28 @@ def map_command(
     max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
     motion: Annotated[Path | None, typer.Option(help="A motion.toml, as motion-error writes it.")] = None,
     pose_source: Annotated[
-        str, typer.Option("--poses", help="odometry (what the recording claims) or truth.")
+        str,
+        typer.Option("--poses", help="odometry (what the recording claims), truth, or standing (one place)."),
     ] = "odometry",
     runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
 ) -> None:
     """Map a recording: runs/<stamp>-<name>/ gets the map, figures, metrics.json, config.toml and report.html."""
-    from .config import MappingConfig, load_config
     from .mapping_run import map_recording
-    from .recording import TruePoses, open_recording
+    from .recording import RawMcapRecording, TruePoses, open_recording
 
-    source = open_recording(recording)
-    if pose_source not in ("odometry", "truth"):
-        raise InvalidInputError(f"--poses must be odometry or truth, not {pose_source!r}")
-    chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(source.camera)
-    chosen = replace(chosen, matcher=_chosen_matcher(chosen.matcher, matcher, network, num_disparities))
-    chosen = _overridden(chosen, cell, max_range, motion)
+    if pose_source not in ("odometry", "truth", "standing"):
+        raise InvalidInputError(f"--poses must be odometry, truth or standing, not {pose_source!r}")
+    source = RawMcapRecording(recording, standing=True) if pose_source == "standing" else open_recording(recording)
+    chosen = chosen_config(
+        source.camera,
+        config,
+        matcher=matcher,
+        network=network,
+        num_disparities=num_disparities,
+        cell=cell,
+        max_range=max_range,
+        motion=motion,
+    )
     result = map_recording(
         TruePoses(source) if pose_source == "truth" else source,
         chosen,
@@ -77,8 +86,27 @@ def map_command(
         command=" ".join(["stereogrid", *sys.argv[1:]]),
         track=track,
     )
-    _print_scores(result.scores)
+    print_scores(result.scores)
     console.print(f"{result.grid!r}\n{result.folder}", highlight=False, soft_wrap=True)
+
+
+def chosen_config(
+    camera: "StereoCamera",
+    config: Path | None,
+    *,
+    matcher: str | None = None,
+    network: Path | None = None,
+    num_disparities: int | None = None,
+    cell: float | None = None,
+    max_range: float | None = None,
+    motion: Path | None = None,
+) -> "MappingConfig":
+    """The config of a file, or what suits the camera, with the options that were given on the command line."""
+    from .config import MappingConfig, load_config
+
+    chosen = load_config(MappingConfig, config) if config else MappingConfig.for_camera(camera)
+    chosen = replace(chosen, matcher=_chosen_matcher(chosen.matcher, matcher, network, num_disparities))
+    return _overridden(chosen, cell, max_range, motion)
 
 
 def _chosen_matcher(
@@ -131,9 +159,26 @@ def info(recording: RecordingPath) -> None:
         soft_wrap=True,
     )
     for key, value in getattr(source, "metadata", {}).items():
-        console.print(f"{key}: {value}", highlight=False, soft_wrap=True)
-    if getattr(source, "damage", None):
-        console.print(f"incomplete: {source.damage}", highlight=False, soft_wrap=True)  # type: ignore[attr-defined]
+        lines = value.splitlines() or [""]
+        more = f" ... ({len(lines)} lines)" if len(lines) > 1 else ""
+        console.print(f"{key}: {lines[0]}{more}", highlight=False, markup=False, soft_wrap=True)
+    for line in _doubts(source):
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def _doubts(source: "Recording") -> "Iterator[str]":
+    """What is not as it should be in a recording."""
+    from .recording import McapRecording, RawMcapRecording
+
+    if isinstance(source, RawMcapRecording):
+        skew_ms = 1e3 * abs(source.skew_s)
+        yield f"skew of the pictures of a pair: {skew_ms.mean():.1f} ms, at most {skew_ms.max():.1f} ms"
+        for topic in source.unstamped:
+            yield f"all of {topic} has one header stamp: the times at which it was recorded are used instead"
+        for what, count in source.left_out.items():
+            yield f"left out: {count} {what}"
+    if isinstance(source, McapRecording | RawMcapRecording) and source.damage is not None:
+        yield f"incomplete: {source.damage}"
 
 
 @app.command(epilog="Example: stereogrid score map.sgrid drive.mcap --range 5")
@@ -154,7 +199,7 @@ def score(
             source, loaded.cell_m, max_range_m=max_range, progress=lambda done, total: show(0.6 * done / total)
         )
         scores = truth.score(loaded, prior=loaded.model.prior)
-    _print_scores(scores)
+    print_scores(scores)
 
 
 @app.command("export", epilog="Example: stereogrid export map.sgrid map.bt")
@@ -204,7 +249,8 @@ def _bar(what: str) -> Iterator[Callable[[float], None]]:
         yield lambda share: progress.update(task, completed=share)
 
 
-def _print_scores(scores: "Iterable[Score]") -> None:
+def print_scores(scores: "Iterable[Score]") -> None:
+    """A table on stdout."""
     from .scoring.score import DIMENSIONLESS
 
     table = Table("score", "value", "unit", "n", box=None)

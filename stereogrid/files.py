@@ -37,6 +37,16 @@ def check_writable(path: Path) -> None:
         raise InvalidInputError(f"{path}: cannot be written ({error.strerror})") from error
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder, and those it is in, unless it is there. Raises InvalidInputError when that cannot be."""
+    if path.exists() and not path.is_dir():
+        raise InvalidInputError(f"{path}: is no folder")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be made ({error.strerror})") from error
+
+
 def _claim_beside(path: Path) -> Path:
     if not path.parent.is_dir():
         raise InvalidInputError(f"{path.parent}: no such folder, so {path.name} cannot be written there")

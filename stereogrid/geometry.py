@@ -113,6 +113,20 @@ def rotation_angle_rad(T: FloatArray) -> float:
     return float(Rotation.from_matrix(T[:3, :3]).magnitude())
 
 
+def between(T_start: FloatArray, T_end: FloatArray, share: ArrayLike) -> FloatArray:
+    """Poses (..., 4, 4) at a share (...), 0 to 1, of the way from T_start to T_end (..., 4, 4).
+
+    Moved on a straight line, turned evenly on the shortest way.
+    """
+    part = as_floats(share)[..., None]
+    R_start = Rotation.from_matrix(T_start[..., :3, :3])
+    turn = (R_start.inv() * Rotation.from_matrix(T_end[..., :3, :3])).as_rotvec()
+    T = T_start.copy()
+    T[..., :3, :3] = (R_start * Rotation.from_rotvec(turn * part)).as_matrix()
+    T[..., :3, 3] = (1 - part) * T_start[..., :3, 3] + part * T_end[..., :3, 3]
+    return T
+
+
 def look_at(eye_m: FloatArray, target_m: FloatArray) -> FloatArray:
     """The pose (4, 4) of an optical frame (x right, y down, z forward) at eye_m that looks at target_m, z up."""
     z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)

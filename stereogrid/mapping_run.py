@@ -1,6 +1,6 @@
 """A whole run of the mapper on a recording: map, checks, figures and report in one run folder."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from matplotlib.figure import Figure
 
+from .camera import StereoCamera
 from .config import MappingConfig, save_config
 from .errors import InvalidInputError, MapTooLargeError, RecordingError
 from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
@@ -28,6 +29,13 @@ class Track(Protocol):
     """Yields items and shows how many of total are done; `what` says what is being done to them."""
 
     def __call__(self, items: Iterable[Item], what: str, total: int) -> Iterator[Item]: ...
+
+
+class HasCamera(Protocol):
+    """Whatever knows the rectified pair: a recording, live cameras."""
+
+    @property
+    def camera(self) -> StereoCamera: ...
 
 
 @dataclass(frozen=True)
@@ -144,18 +152,9 @@ def map_recording(
     config.build_mapper(recording.camera)  # refuses what cannot work before anything is written
     with run_folder(runs, name) as folder:
         mapped = map_while_it_fits(recording, config, track)
-        scores = _scores(mapped)
         facts = {"command": command} | _stop(mapped, recording)
-        save_config(config, folder / "config.toml")
-        mapped.grid.save(folder / "map.sgrid")
-        write_metrics(folder, {**facts, "scores": scores_to_dict(scores)})
-        write_report(
-            folder,
-            f"Map of {name}",
-            summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
-            arms={"map": scores},
-            figures=draw_map(mapped, recording, folder, track),
-            facts={**facts, "map sha256": mapped.grid.sha256()},
+        scores = write_mapped(
+            folder, mapped, config, source=recording, title=f"Map of {name}", facts=facts, track=track
         )
         if out is not None:
             mapped.grid.save(out)
@@ -163,6 +162,32 @@ def map_recording(
         places = " and ".join(str(place) for place in (finished_path(folder), out) if place)
         raise MapTooLargeError(f"{_stop(mapped, recording)['stopped']}; the map so far is saved in {places}")
     return MappingResult(finished_path(folder), mapped.grid, scores)
+
+
+def write_mapped(
+    folder: Path,
+    mapped: Mapped,
+    config: MappingConfig,
+    *,
+    source: HasCamera,
+    title: str,
+    facts: Mapping[str, str],
+    track: Track = untracked,
+) -> list[Score]:
+    """Write map, config, metrics, figures and report of a map of what `source` saw; what can be said without truth."""
+    scores = _scores(mapped)
+    save_config(config, folder / "config.toml")
+    mapped.grid.save(folder / "map.sgrid")
+    write_metrics(folder, {**facts, "scores": scores_to_dict(scores)})
+    write_report(
+        folder,
+        title,
+        summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
+        arms={"map": scores},
+        figures=draw_map(mapped, source, folder, track),
+        facts={**facts, "map sha256": mapped.grid.sha256()},
+    )
+    return scores
 
 
 def _scores(mapped: Mapped) -> list[Score]:
@@ -182,7 +207,7 @@ def _stop(mapped: Mapped, recording: Recording) -> dict[str, str]:
 
 def draw_map(
     mapped: Mapped,
-    recording: Recording,
+    source: HasCamera,
     folder: Path,
     track: Track = untracked,
     *,
@@ -206,7 +231,7 @@ def draw_map(
             "cubes",
             "Occupied cells as cubes, higher ones lighter, ground in grey; the camera in red (Fig. 9). "
             "Cells more than 1 m above the camera are left out.",
-            lambda: _draw_cubes(mapped, recording),
+            lambda: _draw_cubes(mapped, source),
         ),
     ]
     figures = []
@@ -217,13 +242,13 @@ def draw_map(
     return figures
 
 
-def _draw_cubes(mapped: Mapped, recording: Recording) -> Figure:
+def _draw_cubes(mapped: Mapped, source: HasCamera) -> Figure:
     ground_m = -camera_height(mapped.grid, mapped.path_m).value
     up_m = max(3.0, 0.4 * mapped.grid.model.max_range_m)
     return cubes_figure(
         mapped.grid,
         mapped.sample[0].T_world_cam,
-        recording.camera,
+        source.camera,
         back_and_up_m=(1.4 * up_m, up_m),
         path_m=mapped.path_m,
         heights_m=(-np.inf, 1.0),

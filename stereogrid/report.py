@@ -103,7 +103,7 @@ def write_report(
         *(table.html for table in tables),
         "" if tables else score_table(first if headline else arms, meanings),
         *(_figure(figure) for figure in figures),
-        _folded("All scores", score_table(arms, meanings)) if headline or tables else "",
+        _folded("All scores", score_table(arms, meanings)) if arms and (headline or tables) else "",
         _facts({**facts, **environment()}),
     ]
     if config.exists():

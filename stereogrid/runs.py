@@ -31,6 +31,15 @@ def run_folder(root: Path, name: str) -> Iterator[Path]:
     _point_latest(root / "latest", final)
 
 
+def check_runs(root: Path) -> None:
+    """Raise InvalidInputError now when no run folder could be made in root after long work; leaves at most root."""
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        _claim(root, "check").rmdir()
+    except OSError as error:
+        raise InvalidInputError(f"{root}: results cannot be written there ({error.strerror})") from None
+
+
 def finished_path(partial: Path) -> Path:
     """Where a folder yielded by run_folder will stand once it is whole."""
     return partial.with_name(partial.name.removeprefix(".").removesuffix(".partial"))

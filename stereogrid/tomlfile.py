@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, asdict, fields, is_dataclass
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from .errors import ConfigError, StereogridError
@@ -21,7 +22,8 @@ T = TypeVar("T")
 def config_from_table(kind: type[T], table: Mapping[str, Any], where: str = "") -> T:
     """A config dataclass from a nested table; unknown keys and values of the wrong type are refused by name.
 
-    A field may be a number, a text, a section, or a list of any of them (`tuple[kind, ...]`).
+    A field may be a number, a text, a section, or a list of any of them (`tuple[kind, ...]`); `kind | None` may be left
+    out.
     """
     types = get_type_hints(kind)
     names = [f.name for f in fields(kind)]  # type: ignore[arg-type]
@@ -46,6 +48,8 @@ def _is_needed(field: "Field[Any]") -> bool:
 
 
 def _checked(expected: Any, value: Any, where: str) -> Any:
+    if get_origin(expected) is UnionType:
+        (expected,) = (kind for kind in get_args(expected) if kind is not NoneType)
     if is_dataclass(expected):
         if not isinstance(value, Mapping):
             raise ConfigError(f"{where!r} must be a section, not {value!r}")
@@ -63,14 +67,23 @@ def _checked(expected: Any, value: Any, where: str) -> Any:
 
 def load_config(kind: type[T], path: str | Path) -> T:
     """A config dataclass from a TOML file. Raises ConfigError naming the file and the culprit."""
+    table = read_table(path)
+    try:
+        return config_from_table(kind, table)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
+
+
+def read_table(path: str | Path) -> dict[str, Any]:
+    """What a TOML file says, unchecked. Raises ConfigError naming the file."""
     path = Path(path)
     try:
-        return config_from_table(kind, tomllib.loads(path.read_text(encoding="utf-8")))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: is no text in UTF-8, as TOML must be") from None
-    except (ConfigError, tomllib.TOMLDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: {error}") from None
 
 

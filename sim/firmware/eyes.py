@@ -7,8 +7,8 @@ from types import TracebackType
 
 from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import FloatArray
+from stereogrid.mjpeg import MjpegServer, jpeg
 
-from ..mjpeg import MjpegServer, jpeg
 from ..rendering.render import Renderer
 from ..rig import MINORU, StereoRig, mount, webcam
 from ..scene.scene import World

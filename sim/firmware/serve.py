@@ -5,9 +5,9 @@ from contextlib import ExitStack, closing
 
 import arcos
 from stereogrid.errors import unknown_name
+from stereogrid.interrupts import held_interrupts
+from stereogrid.mjpeg import MjpegServer
 
-from ..interrupts import held_interrupts
-from ..mjpeg import MjpegServer
 from ..rig import calibration
 from ..robot.pioneer import TICK_S, Pioneer
 from ..worlds.world import WorldPlan

@@ -12,9 +12,9 @@ import cv2
 
 from stereogrid.camera import StereoCamera
 from stereogrid.geometry import FloatArray
+from stereogrid.interrupts import held_interrupts
+from stereogrid.mjpeg import MjpegServer, jpeg
 
-from ..interrupts import held_interrupts
-from ..mjpeg import MjpegServer, jpeg
 from ..rig import StereoRig, calibration
 from ..robot.follower import PathFollower
 from ..robot.headway import Headway

@@ -19,6 +19,8 @@ FIELD_OF_VIEW_DEG = (10.0, 150.0)
 MAX_ASPECT = 0.05
 MAX_RECTIFYING_TURN_DEG = 20.0
 """A rig whose pictures have to be turned further has no two cameras side by side: the calibration is wrong."""
+BASELINE_M = (0.005, 2.0)
+"""Who gives the chessboard's squares in millimetres gets a baseline that no robot carries."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,13 @@ class CalibrationErrors:
     epipolar_p95_px: float
     square_edge_mean: float
     square_edge_sd: float
+
+    def __post_init__(self) -> None:
+        if len(self.rms_px) != 2:
+            raise InvalidInputError(f"rms_px must be of the left and the right camera, not {self.rms_px}")
+        for name, value in vars(self).items():
+            if not (np.isfinite(value).all() and np.min(value) >= 0):
+                raise InvalidInputError(f"{name} must be finite and >= 0, not {value}")
 
 
 @dataclass(frozen=True)
@@ -64,12 +73,7 @@ class StereoCalibration:
         rectified_px = self._rectification.camera.focal_px
         for side, K, distortion in zip(("left", "right"), self.K, self.distortion, strict=True):
             _check_distortion(as_floats(K), as_floats(distortion), self.size_px, side)
-        turn_deg = np.rad2deg(rotation_angle_rad(from_rotation(self._rectification.R_rect_left)))
-        if turn_deg > MAX_RECTIFYING_TURN_DEG:
-            raise InvalidInputError(
-                f"rectifying would turn the left picture by {turn_deg:.0f} degrees, more than "
-                f"{MAX_RECTIFYING_TURN_DEG:g}: these are not two cameras side by side"
-            )
+        check_rectifying_turn(self._rectification.R_rect_left)
         focal_px = self.K[0][0, 0]
         if not 0.5 < rectified_px / focal_px < 2.0:
             raise InvalidInputError(
@@ -104,6 +108,16 @@ class StereoCalibration:
         return left, right
 
 
+def check_rectifying_turn(R_rect_left: FloatArray) -> None:
+    """Raise InvalidInputError for a rotation (3, 3) that rectifies no pair of cameras side by side."""
+    turn_deg = np.rad2deg(rotation_angle_rad(from_rotation(R_rect_left)))
+    if turn_deg > MAX_RECTIFYING_TURN_DEG:
+        raise InvalidInputError(
+            f"rectifying would turn the left picture by {turn_deg:.0f} degrees, more than "
+            f"{MAX_RECTIFYING_TURN_DEG:g}: these are not two cameras side by side"
+        )
+
+
 def _check_intrinsics(K: FloatArray, size_px: tuple[int, int], side: str) -> None:
     if K.shape != (3, 3) or not np.isfinite(K).all():
         raise InvalidInputError(f"the {side} intrinsics must be (3, 3) and finite, not {K.tolist()}")
@@ -129,14 +143,18 @@ def _check_distortion(K: FloatArray, distortion: FloatArray, size_px: tuple[int,
     distorted = np.sqrt(r2) * (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
     folds = np.append(np.nonzero(np.diff(distorted) <= 0)[0], len(r2) - 1)[0]
     if not distorted[folds] >= reach:
-        raise InvalidInputError(f"the {side} distortion {distortion.ravel().tolist()} folds the picture back on itself")
+        numbers = ", ".join(f"{number:.4g}" for number in distortion.ravel())
+        raise InvalidInputError(
+            f"the {side} distortion {numbers} folds the picture back on itself before its corners; pairs with the "
+            "board nearer to them would tell it better"
+        )
 
 
-def misfit(rms_px: float) -> InvalidInputError:
-    """The error for corners that no calibration explains."""
+def misfit(rms_px: float, far: tuple[str, ...] = ()) -> InvalidInputError:
+    """The error for corners that no calibration explains; far: a line for each pair that is far off."""
     return InvalidInputError(
         f"the corners do not fit: rms {rms_px:.2f} px, more than {MAX_RMS_PX:g} px; is the board flat, and are the "
-        "left and the right pictures of the same moments?"
+        f"left and the right pictures of the same moments? {'; '.join(far)}".rstrip()
     )
 
 
@@ -146,6 +164,12 @@ def _check_side_by_side(T_right_left: FloatArray) -> None:
     if x >= 0:
         raise InvalidInputError(
             f"the right camera is not to the right: baseline {-x * 1000:.1f} mm; are left and right swapped?"
+        )
+    low, high = BASELINE_M
+    if not low <= -x <= high:
+        raise InvalidInputError(
+            f"the baseline is {-x * 1000:.6g} mm, for two cameras of one robot expected {low * 1000:g} to "
+            f"{high * 1000:g}; is the side of the board's squares given in metres?"
         )
     if np.hypot(y, z) > -x * np.tan(np.deg2rad(MAX_RECTIFYING_TURN_DEG)):
         raise InvalidInputError(

@@ -1,7 +1,7 @@
 """From pictures of a chessboard to a calibration."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ..errors import InvalidInputError
-from ..geometry import Array, FloatArray, as_floats, from_rotation
+from ..geometry import Array, FloatArray, as_floats, from_rotation, inverse
 from ..observation import Image
-from .chessboard import Chessboard, find_corners
-from .rig import MAX_RMS_PX, CalibrationErrors, StereoCalibration, misfit
+from .chessboard import Chessboard
+from .residuals import far_pairs, pair_rms_px, residuals, stereo_off_px
+from .rig import MAX_RMS_PX, StereoCalibration, misfit
+from .views import MIN_PAIRS, BoardViews, check_enough, find_views
 
-MIN_PAIRS = 5
-"""Fewer views of a plane leave focal length and distortion open."""
 MODEL = cv2.CALIB_FIX_K3
 """k1, k2, p1, p2: a third radial term follows the noise of the corners and runs away where no board was seen."""
 CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-9)
@@ -30,23 +30,8 @@ def calibrate_stereo(
     is left out, and named in `left_out`. Raises InvalidInputError when the sizes differ, too few pairs are left, or
     the result is none that two cameras side by side can have.
     """
-    named = list(zip(names or [f"pair {n}" for n in range(1, len(pairs) + 1)], pairs, strict=True))
-    size_px = _common_size(named)
-    corners: list[tuple[FloatArray, FloatArray]] = []
-    left_out: list[str] = []
-    for name, pair in named:
-        left, right = (find_corners(image, board) for image in pair)
-        if left is None or right is None:
-            missing = " and the ".join(side for side, found in (("left", left), ("right", right)) if found is None)
-            left_out.append(f"{name}: no board of {board} in the {missing} image")
-        else:
-            corners.append((left, right))
-    if len(corners) < MIN_PAIRS:
-        raise InvalidInputError(
-            "; ".join([f"only {len(corners)} of {len(pairs)} pairs can be used, {MIN_PAIRS} are needed", *left_out])
-        )
-    left_corners, right_corners = (np.stack(each) for each in zip(*corners, strict=True))
-    return calibrate_corners(left_corners, right_corners, board, size_px, tuple(left_out))
+    named = zip(names or [f"pair {n}" for n in range(1, len(pairs) + 1)], pairs, strict=True)
+    return calibrate_views(find_views(named, board))
 
 
 def calibrate_corners(
@@ -57,19 +42,28 @@ def calibrate_corners(
     left_out: tuple[str, ...] = (),
 ) -> StereoCalibration:
     """The same from the corners (M, N, 2) of M pairs [px], N in the order of `Chessboard.corners_m`."""
-    both = as_floats(corners_left).astype(np.float32), as_floats(corners_right).astype(np.float32)
-    if both[0].shape != both[1].shape or both[0].ndim != 3 or both[0].shape[1:] != (len(board.corners_m), 2):
+    left, right = as_floats(corners_left), as_floats(corners_right)
+    if left.shape != right.shape or left.ndim != 3 or left.shape[1:] != (len(board.corners_m), 2):
         raise InvalidInputError(
-            f"expected corners (M, {len(board.corners_m)}, 2) of both cameras, not {both[0].shape} and {both[1].shape}"
+            f"expected corners (M, {len(board.corners_m)}, 2) of both cameras, not {left.shape} and {right.shape}"
         )
-    if len(both[0]) < MIN_PAIRS:
-        raise InvalidInputError(f"{len(both[0])} pairs are too few to calibrate from: {MIN_PAIRS} are needed")
-    boards = [board.corners_m.astype(np.float32)] * len(both[0])
+    if len(left) < MIN_PAIRS:
+        raise InvalidInputError(f"{len(left)} pairs are too few to calibrate from: {MIN_PAIRS} are needed")
+    names = tuple(f"pair {n}" for n in range(1, len(left) + 1))
+    return calibrate_views(BoardViews(board, size_px, names, (left, right), left_out))
+
+
+def calibrate_views(views: BoardViews) -> StereoCalibration:
+    """The same from the views that find_views found. Where pairs that are far off spoil it, the error names them."""
+    check_enough(views)
+    left, right = views.corners[0].astype(np.float32), views.corners[1].astype(np.float32)
+    boards = [views.board.corners_m.astype(np.float32)] * len(left)
     try:
-        alone = [_one_camera(boards, list(corners), size_px) for corners in both]
-        (_, K0, D0), (_, K1, D1) = alone
+        alone = [_one_camera(boards, list(corners), views.size_px) for corners in (left, right)]
+        # Copies, since OpenCV writes into what it is given.
+        K0, D0, K1, D1 = (array.copy() for each in alone for array in (each.K, each.distortion))
         rms_px, K0, D0, K1, D1, R, t_m, *_ = cv2.stereoCalibrate(
-            boards, list(both[0]), list(both[1]), K0, D0, K1, D1, size_px,
+            boards, list(left), list(right), K0, D0, K1, D1, views.size_px,
             flags=cv2.CALIB_USE_INTRINSIC_GUESS | MODEL, criteria=CRITERIA,
         )  # fmt: skip
     except cv2.error as error:
@@ -77,23 +71,50 @@ def calibrate_corners(
             f"the corners do not determine the cameras: tilt the board in more ways ({error.err})"
         ) from error
     if not rms_px <= MAX_RMS_PX:
-        raise misfit(rms_px)
-    found = StereoCalibration((K0, K1), (D0.ravel(), D1.ravel()), from_rotation(R, t_m.ravel()), size_px)
-    errors = _errors(found, both, board, (alone[0][0], alone[1][0]))
-    return replace(found, errors=errors, n_pairs=len(both[0]), left_out=left_out)
+        raise misfit(rms_px, tuple(_odd_pairs(views, alone).values()))
+    found = StereoCalibration((K0, K1), (D0.ravel(), D1.ravel()), from_rotation(R, t_m.ravel()), views.size_px)
+    errors = residuals(found, views.corners, views.board).errors((alone[0].rms_px, alone[1].rms_px))
+    return replace(found, errors=errors, n_pairs=len(views.names), left_out=views.left_out)
 
 
-def _one_camera(
-    boards: Sequence[Array], corners: Sequence[Array], size_px: tuple[int, int]
-) -> tuple[float, FloatArray, FloatArray]:
-    """rms [px], K (3, 3) and distortion of one camera alone."""
+def without_far_pairs(views: BoardViews) -> BoardViews:
+    """The views without the pairs that are far worse than the others, which become left_out. Needs some to be left."""
+    for _ in range(len(views.names)):
+        check_enough(views)
+        try:
+            found = calibrate_views(views)
+        except InvalidInputError:
+            far = _odd_pairs(views)
+        else:
+            far = far_pairs(views.names, residuals(found, views.corners, views.board).rms_px)
+        if not far:
+            break
+        views = views.without(far, far.values())
+    return views
+
+
+@dataclass(frozen=True, eq=False)
+class _Alone:
+    """One camera's own calibration; poses: T_cam_board (4, 4) of each view."""
+
+    rms_px: float
+    K: FloatArray
+    distortion: FloatArray
+    poses: list[FloatArray]
+
+
+def _one_camera(boards: Sequence[Array], corners: Sequence[Array], size_px: tuple[int, int]) -> _Alone:
     _, K, D, turns, shifts, *_ = cv2.calibrateCamera(
         boards, corners, size_px, None, None, flags=MODEL, criteria=CRITERIA
     )
     expected = [
         cv2.projectPoints(b, r, t, K, D)[0].reshape(-1, 2) for b, r, t in zip(boards, turns, shifts, strict=True)
     ]
-    return _rms(np.stack(expected) - np.stack(corners)), K, D
+    poses = [
+        from_rotation(Rotation.from_rotvec(turn.ravel()).as_matrix(), shift.ravel())
+        for turn, shift in zip(turns, shifts, strict=True)
+    ]
+    return _Alone(_rms(np.stack(expected) - np.stack(corners)), K, D, poses)
 
 
 def _rms(off_px: FloatArray) -> float:
@@ -101,57 +122,20 @@ def _rms(off_px: FloatArray) -> float:
     return float(np.sqrt((off_px**2).sum(axis=-1).mean()))
 
 
-def _errors(
-    calibration: StereoCalibration, corners: tuple[Array, Array], board: Chessboard, rms_px: tuple[float, float]
-) -> CalibrationErrors:
-    left, right = calibration.rectified_points(*corners)
-    rows_px = np.abs(left[:, 1] - right[:, 1])
-    disparity_px = left[:, 0] - right[:, 0]
-    camera = calibration.rectification().camera
-    depth_m = camera.depth_m(np.where(disparity_px > 0, disparity_px, np.nan))
-    points_m = np.column_stack([(left - [camera.cx_px, camera.cy_px]) / camera.focal_px, np.ones(len(left))])
-    grid_m = (points_m * depth_m[:, None]).reshape(-1, board.rows, board.columns, 3)
-    edges = [np.linalg.norm(np.diff(grid_m, axis=a), axis=-1).ravel() / board.square_m for a in (1, 2)]
-    edge = np.concatenate(edges)
-    return CalibrationErrors(
-        rms_px=rms_px,
-        stereo_rms_px=_stereo_rms(calibration, corners, board),
-        epipolar_mean_px=float(rows_px.mean()),
-        epipolar_p95_px=float(np.percentile(rows_px, 95)),
-        square_edge_mean=float(edge.mean()),
-        square_edge_sd=float(edge.std()),
-    )
-
-
-def _stereo_rms(calibration: StereoCalibration, corners: tuple[Array, Array], board: Chessboard) -> float:
-    """rms [px] of the corners of both cameras, when the right one sees each board where the left one found it."""
-    (K0, K1), (D0, D1), T = calibration.K, calibration.distortion, calibration.T_right_left
-    off_px = []
-    for left, right in zip(*corners, strict=True):
-        _, turn, shift = cv2.solvePnP(board.corners_m, left, K0, D0)
-        T_left_board = from_rotation(Rotation.from_rotvec(turn.ravel()).as_matrix(), shift.ravel())
-        T_right_board = T @ T_left_board
-        seen = cv2.projectPoints(board.corners_m, turn, shift, K0, D0)[0].reshape(-1, 2)
-        turn_right = Rotation.from_matrix(T_right_board[:3, :3]).as_rotvec()
-        seen_right = cv2.projectPoints(board.corners_m, turn_right, T_right_board[:3, 3], K1, D1)[0].reshape(-1, 2)
-        off_px.append(np.stack([seen - left, seen_right - right]))
-    return _rms(np.stack(off_px))
-
-
-def _common_size(named: Sequence[tuple[str, tuple[Image, Image]]]) -> tuple[int, int]:
-    """(width, height) of all images."""
-    if not named:
-        raise InvalidInputError("there are no pairs to calibrate from")
-    first_name, (first, _) = named[0]
-    for name, pair in named:
-        for side, image in zip(("left", "right"), pair, strict=True):
-            if image.ndim != 2 or image.dtype != np.uint8:
-                raise InvalidInputError(
-                    f"{name}: the {side} image must be (H, W) uint8, not {image.shape} {image.dtype}"
-                )
-            if image.shape != first.shape:
-                (h, w), (h0, w0) = image.shape, first.shape
-                raise InvalidInputError(
-                    f"{name}: the {side} image is {w}x{h} px, the left one of {first_name} {w0}x{h0}"
-                )
-    return first.shape[1], first.shape[0]
+def _odd_pairs(views: BoardViews, alone: Sequence[_Alone] | None = None) -> dict[str, str]:
+    """The pairs that contradict the others, found without a fit that they would spoil: far_pairs of the rig that most
+    pairs agree with, among those that one pair each tells of."""
+    if alone is None:
+        boards = [views.board.corners_m.astype(np.float32)] * len(views.names)
+        alone = [_one_camera(boards, list(each.astype(np.float32)), views.size_px) for each in views.corners]
+    left, right = alone
+    best: FloatArray | None = None
+    for T_left_board, T_right_board in zip(left.poses, right.poses, strict=True):
+        T_right_left = T_right_board @ inverse(T_left_board)
+        off_px = stereo_off_px(
+            (left.K, right.K), (left.distortion, right.distortion), T_right_left, views.corners, views.board
+        )
+        rms_px = pair_rms_px(off_px)
+        if best is None or np.median(rms_px) < np.median(best):
+            best = rms_px
+    return {} if best is None else far_pairs(views.names, best)

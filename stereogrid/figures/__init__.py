@@ -1,5 +1,6 @@
 """Figures of maps and readings. Each function returns a matplotlib Figure; nothing opens a window."""
 
+from .calibration import calibration_figure, rectified_figure
 from .cubes import cubes_figure
 from .motion import motion_figure
 from .panels import panels_figure
@@ -11,12 +12,14 @@ from .tradeoff import TradeoffPoint, tradeoff_figure
 
 __all__ = [
     "TradeoffPoint",
+    "calibration_figure",
     "cubes_figure",
     "disparity_figure",
     "draw_slice",
     "figure_png",
     "motion_figure",
     "panels_figure",
+    "rectified_figure",
     "reliability_figure",
     "save_figure",
     "slice_figure",

@@ -8,7 +8,7 @@ from .fit import FitOptions, FittedGrowth, MotionFit, fit_motion
 from .legs import Measured
 from .noise import MotionNoise, NoisyOdometry, OdometryNoise
 from .runs import Run, Runs
-from .runs_csv import read_runs, write_runs
+from .runs_csv import append_readings, read_runs, write_runs
 from .uncertainty import PoseUncertainty
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "PoseUncertainty",
     "Run",
     "Runs",
+    "append_readings",
     "fit_motion",
     "read_runs",
     "write_runs",

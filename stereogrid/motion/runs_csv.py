@@ -2,6 +2,7 @@
 
 import csv
 import difflib
+import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..errors import InvalidInputError
 from ..files import written_beside
+from ..geometry import FloatArray
 from .runs import Run, Runs
 
 SIDES = ("odo", "true")
@@ -23,6 +25,10 @@ COLUMNS = {
     for unit, factor in units.items()
 }
 """What a column with numbers may be called: whose, what, and times what it is in metres and radians."""
+NEW_HEADER = ("run", "surface", *(f"{side}_{what}" for side in SIDES for what in ("x_m", "y_m", "heading_deg")))
+"""Of a file that rows are appended to: the units that a person reads it in."""
+FINEST = 1e-5
+"""Rows are appended to a hundredth of a millimetre, and about as fine in angles [m, rad]."""
 FARTHEST_M = 100.0
 MOST_TURNED_RAD = 4 * np.pi
 """Runs over marks reach no farther from their start: what does is in another unit."""
@@ -54,6 +60,38 @@ def write_runs(path: str | Path, runs: Runs) -> None:
         for run in runs:
             for row in np.hstack([run.odo[:, : len(quantities)], run.true[:, : len(quantities)]]):
                 writer.writerow([run.name, run.surface, *(f"{value:.6f}" for value in row)])
+
+
+def append_readings(path: str | Path, run: Run, first: int = 0) -> None:
+    """Add the readings of a run from number `first` on to a file, in the file's own columns, or begin a new one.
+
+    Whatever happens the file is whole: as it was, or with all of them. Raises InvalidInputError where it holds no runs,
+    or has no column for what the run has.
+    """
+    path = Path(path)
+    if path.exists():
+        read_runs(path)
+        before = path.read_bytes()
+    else:
+        before = (",".join(NEW_HEADER) + "\n").encode()
+    text = before.decode("utf-8-sig")
+    header = [name.strip() for name in next(csv.reader(io.StringIO(text)))]
+    if run.surface and "surface" not in header:
+        raise InvalidInputError(f"{path}: has no column 'surface', and {run} names one")
+    rows = io.StringIO()
+    writer = csv.writer(rows, lineterminator="\r\n" if "\r\n" in text else "\n")
+    for odo, true in zip(run.odo[first:], run.true[first:], strict=True):
+        named = {"run": run.name, "surface": run.surface}
+        writer.writerow([named[name] if name in named else _cell(name, {"odo": odo, "true": true}) for name in header])
+    end = b"" if before.endswith(b"\n") else b"\n"
+    with written_beside(path) as temporary:
+        temporary.write_bytes(before + end + rows.getvalue().encode())
+
+
+def _cell(name: str, reading: dict[str, FloatArray]) -> str:
+    """What stands in the column `name` for one reading of odometry and truth [m, rad]."""
+    side, what, factor = COLUMNS[name]
+    return f"{reading[side][list(UNITS).index(what)] / factor:.{max(0, math.ceil(math.log10(factor / FINEST)))}f}"
 
 
 def _runs(rows: Sequence[tuple[int, list[str]]]) -> Runs:

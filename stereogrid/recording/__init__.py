@@ -7,8 +7,12 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..observation import Recording
 from .kitti import KittiRecording, is_kitti
-from .mcap import McapRecording, McapWriter
-from .mcap_scan import is_mcap
+from .mcap import RECTIFIED, WANTED, McapRecording, McapWriter
+from .mcap_scan import is_mcap, scan
+from .raw_mcap import RawMcapRecording, RawTopics
+from .raw_writer import RawReport, RawWriter
+from .ros2_file import METADATA_NAME
+from .ros2_raw import KIND, RAW
 from .ticks import KnowsMotion, Ticks
 from .views import ShuffledPoses, Subset, TruePoses, TrueTilt, poses, stamps_s
 
@@ -18,6 +22,10 @@ __all__ = [
     "KnowsMotion",
     "McapRecording",
     "McapWriter",
+    "RawMcapRecording",
+    "RawReport",
+    "RawTopics",
+    "RawWriter",
     "RecordingKind",
     "ShuffledPoses",
     "Subset",
@@ -39,8 +47,18 @@ class RecordingKind:
     needs: str
 
 
+def _open_mcap(path: Path) -> McapRecording | RawMcapRecording:
+    """Of rectified observations, or of what a robot and its cameras sent."""
+    topics = RawTopics()
+    contents = scan(path, {**topics.wanted(), **WANTED})
+    ours = contents.metadata.get(METADATA_NAME, {}).get(KIND) == RAW
+    if ours or (contents.messages.keys() & set(topics.images) and not contents.messages.keys() & set(RECTIFIED)):
+        return RawMcapRecording(path, topics, contents=contents)
+    return McapRecording(path, contents)
+
+
 RECORDINGS = {
-    "mcap": RecordingKind(is_mcap, McapRecording, "a file written by stereogrid, *.mcap"),
+    "mcap": RecordingKind(is_mcap, _open_mcap, "a file written by stereogrid, *.mcap"),
     "kitti": RecordingKind(
         is_kitti,
         KittiRecording,

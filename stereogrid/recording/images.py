@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from ..errors import RecordingError
+from ..jpeg_header import is_jpeg, jpeg_size_px
 from ..observation import Image
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -29,6 +30,19 @@ def png_size(encoded: bytes, name: str) -> tuple[int, int]:
     return height, width
 
 
+def image_size(encoded: bytes, name: str) -> tuple[int, int]:
+    """(height, width) as the first bytes of a PNG or JPEG say, without decoding it.
+
+    Raises RecordingError, naming `name`, when the bytes are neither.
+    """
+    if not is_jpeg(encoded):
+        return png_size(encoded, name)
+    size_px = jpeg_size_px(encoded)
+    if size_px is None:
+        raise RecordingError(f"{name}: a JPEG image without a size")
+    return size_px[1], size_px[0]
+
+
 def decode_grey(encoded: bytes, name: str) -> Image:
     """The grey image (H, W) uint8 of an encoded one; colours are converted, alpha is dropped.
 
@@ -42,8 +56,13 @@ def decode_grey(encoded: bytes, name: str) -> Image:
         raise RecordingError(f"{name}: not a readable image")
     if image.dtype != np.uint8:
         raise RecordingError(f"{name}: the image is {image.dtype.itemsize * 8}-bit, expected 8-bit")
-    if image.ndim == 3:
-        code = cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY
-        image = cv2.cvtColor(image, code)
-    grey: Image = image
-    return grey
+    return grey(image)
+
+
+def grey(image: Image) -> Image:
+    """The grey picture (H, W) of one (H, W), (H, W, 3) BGR or (H, W, 4) BGRA, uint8."""
+    if image.ndim == 2:
+        return image
+    code = cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY
+    converted: Image = cv2.cvtColor(image, code)
+    return converted

@@ -1,32 +1,40 @@
 """Recordings as MCAP files of ROS 2 messages, which Foxglove and `ros2 bag` open too."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import lru_cache
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from mcap.records import Attachment, McapRecord, Message
+from mcap.records import Attachment
 
-from ..errors import InvalidInputError, RecordingError, StereogridError
+from ..errors import InvalidInputError, RecordingError
 from ..geometry import FloatArray
 from ..observation import Image, Observation, Truth
 from . import ros2_messages as ros2
 from .images import decode_grey, png_size
-from .mcap_scan import ClippedFile, Contents, scan
-from .mcap_writer import FORMAT_VERSION, MESH_NAME, METADATA_NAME, NOTE_NAME, McapWriter, mover_mesh_name
+from .mcap_base import McapBase, RecordsAt, told_pose, whole
+from .mcap_scan import ClippedFile, Contents, Wanted
+from .mcap_writer import MESH_NAME, McapWriter, mover_mesh_name
 from .ticks import Ticks
 from .track import odometry_track
 
 __all__ = ["McapRecording", "McapWriter"]
 
-_REQUIRED = (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE, ros2.ODOMETRY)
+RECTIFIED = (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE)
+"""The topics of the pictures."""
+_REQUIRED = (*RECTIFIED, ros2.ODOMETRY)
 
-_RecordsAt = Callable[[int], list[McapRecord]]
+WANTED = {topic: Wanted((type_name,)) for topic, type_name in ros2.TOPICS.items()} | {
+    topic: Wanted((ros2.TOPICS[topic],), keep, once=keep is whole)
+    for topic, keep in (
+        (ros2.LEFT_INFO, whole),
+        (ros2.RIGHT_INFO, whole),
+        (ros2.ODOMETRY, told_pose),
+        (ros2.TRUE_POSE, told_pose),
+    )
+}
 
 
-class McapRecording:
+class McapRecording(McapBase):
     """The observations of an MCAP file written by McapWriter; images are read as they are asked for.
 
     The file is read through once when it is opened: damage is found then, and all before it can be used.
@@ -38,36 +46,23 @@ class McapRecording:
     Raises RecordingError when the file is missing, is no MCAP file or holds no observation of ours.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        contents = scan(self.path)
-        self._contents = contents
-        self.damage = contents.damage
-        self.metadata = {**contents.metadata.get(METADATA_NAME, {}), **contents.metadata.get(NOTE_NAME, {})}
-        try:
-            self._stamps_ns = _whole_observations(contents, self.metadata)
-            self.camera = ros2.read_camera(_first(contents, ros2.LEFT_INFO), _first(contents, ros2.RIGHT_INFO))
-            self.T_base_cam = ros2.read_static_transform(contents.static_transforms)
+    def __init__(self, path: str | Path, contents: Contents | None = None) -> None:
+        super().__init__(path, WANTED, contents)
+        with self._opening():
+            self._stamps_ns = self._whole_observations()
+            self.camera = ros2.read_camera(self._first(ros2.LEFT_INFO), self._first(ros2.RIGHT_INFO))
+            self.T_base_cam = ros2.read_static_transform(self._contents.static_transforms)
             self._odometry = odometry_track([self._pose(ros2.ODOMETRY, stamp) for stamp in self._stamps_ns])
-            true_stamps = contents.small.get(ros2.TRUE_POSE, {}).keys() & set(self._stamps_ns)
+            true_stamps = self._contents.small.get(ros2.TRUE_POSE, {}).keys() & set(self._stamps_ns)
             self._truth = {stamp: self._pose(ros2.TRUE_POSE, stamp) for stamp in true_stamps}
-        except InvalidInputError as error:
-            raise RecordingError(f"{self.path}: {error}" + (f" ({self.damage})" if self.damage else "")) from error
         self.stamps_s: FloatArray = np.array([stamp_ns / 10**9 for stamp_ns in self._stamps_ns])
         self.poses: FloatArray = np.stack([each.T_odom_base @ self.T_base_cam for each in self._odometry])
-
-    @property
-    def is_complete(self) -> bool:
-        """False when the file is damaged or was cut off: some observations are then missing."""
-        return self.damage is None
 
     def __len__(self) -> int:
         return len(self._stamps_ns)
 
     def __iter__(self) -> Iterator[Observation]:
-        with ClippedFile(self.path) as file:
-            # Other writers put many messages in one chunk: unpack it once for all that are near.
-            records_at = lru_cache(maxsize=4)(file.records_at)
+        with self._opened() as records_at:
             for number in range(len(self)):
                 yield self._observation(number, records_at)
 
@@ -112,7 +107,7 @@ class McapRecording:
         """The PLY file of a mover's mesh in its own frame, or None when the recording carries none of that name."""
         return self._attachment(mover_mesh_name(name))
 
-    def _observation(self, number: int, records_at: _RecordsAt) -> Observation:
+    def _observation(self, number: int, records_at: RecordsAt) -> Observation:
         stamp_ns = self._stamps_ns[number]
         with self._naming(f"the observation at {stamp_ns / 10**9:.9f} s"):
             left, right = (self._image(topic, stamp_ns, records_at) for topic in (ros2.LEFT_IMAGE, ros2.RIGHT_IMAGE))
@@ -120,17 +115,7 @@ class McapRecording:
             odometry = self._odometry[number]
             return Observation(stamp_ns / 10**9, left, right, odometry, self.poses[number], truth)
 
-    @contextmanager
-    def _naming(self, what: str) -> Iterator[None]:
-        """Turn whatever goes wrong into a RecordingError that names the file and what was read."""
-        try:
-            yield
-        except Exception as error:
-            # The mcap library raises whatever its parsers stumble on.
-            fault = str(error) if isinstance(error, StereogridError) else f"cannot be decoded: {error!r}"
-            raise RecordingError(f"{self.path}: {what}: {fault}") from error
-
-    def _read_truth(self, stamp_ns: int, records_at: _RecordsAt) -> Truth | None:
+    def _read_truth(self, stamp_ns: int, records_at: RecordsAt) -> Truth | None:
         if stamp_ns not in self._truth:
             return None
         depth_m = None
@@ -142,7 +127,7 @@ class McapRecording:
             movers = ros2.read_movers(self._message(ros2.TRUE_MOVERS, stamp_ns, records_at))
         return Truth(self._truth[stamp_ns], depth_m, movers)
 
-    def _image(self, topic: str, stamp_ns: int, records_at: _RecordsAt) -> Image:
+    def _image(self, topic: str, stamp_ns: int, records_at: RecordsAt) -> Image:
         encoded = self._message(topic, stamp_ns, records_at).data
         # Checked before decoding: a hostile image may claim any size.
         self._check_size(topic, png_size(encoded, topic))
@@ -152,32 +137,10 @@ class McapRecording:
         if shape != self.camera.shape:
             raise InvalidInputError(f"{topic} is {shape}, the recording's camera {self.camera.shape}")
 
-    def _message(self, topic: str, stamp_ns: int, records_at: _RecordsAt) -> Any:
-        place = self._contents.messages[topic][stamp_ns]
-        record = records_at(place.offset)[place.number]
-        if not isinstance(record, Message):
-            raise InvalidInputError("the file changed since it was opened")
-        return ros2.decoder(ros2.TOPICS[topic])(record.data)
-
-    def _pose(self, topic: str, stamp_ns: int) -> FloatArray:
-        # A PoseStamped holds its pose, an Odometry a pose with covariance.
-        pose = self._contents.small[topic][stamp_ns].pose
-        return ros2.read_pose(getattr(pose, "pose", pose), f"{topic} at {stamp_ns / 10**9:.9f} s")
-
-
-def _first(contents: Contents, topic: str) -> Any:
-    return next(iter(contents.small[topic].values()))
-
-
-def _whole_observations(contents: Contents, metadata: dict[str, str]) -> list[int]:
-    if metadata.get("format_version", FORMAT_VERSION) != FORMAT_VERSION:
-        raise InvalidInputError(
-            f"recording format {metadata['format_version']!r} is not known, only {FORMAT_VERSION!r}"
-        )
-    missing = [topic for topic in (*_REQUIRED, ros2.LEFT_INFO, ros2.RIGHT_INFO) if topic not in contents.messages]
-    if missing:
-        raise InvalidInputError(f"no messages on {', '.join(missing)}")
-    stamps = set.intersection(*(set(contents.messages[topic]) for topic in _REQUIRED))
-    if not stamps:
-        raise InvalidInputError("no observation is whole: the stamps of images and odometry never agree")
-    return sorted(stamps)
+    def _whole_observations(self) -> list[int]:
+        """The stamps [ns] of the observations that have all that is required."""
+        self._require(*_REQUIRED, ros2.LEFT_INFO, ros2.RIGHT_INFO)
+        stamps = set.intersection(*(set(self._contents.messages[topic]) for topic in _REQUIRED))
+        if not stamps:
+            raise InvalidInputError("no observation is whole: the stamps of images and odometry never agree")
+        return sorted(stamps)

@@ -1,5 +1,6 @@
 """Finds what an MCAP file holds, as far as it can be read."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, cast
@@ -11,10 +12,24 @@ from mcap.writer import MCAP0_MAGIC
 from ..errors import InvalidInputError, RecordingError
 from . import ros2_messages as ros2
 
+UNSTAMPED = 3
+"""So many messages of one topic with one header stamp, written at different times, have a driver that sets none."""
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
+LAST_STAMP_NS = 2**63 - 1
 MAX_CHUNK_BYTES = 2**28
 """No chunk of ours comes near; a damaged or hostile one may claim to unpack to anything."""
 
-_HELD_IN_MEMORY = (ros2.TF_STATIC, ros2.LEFT_INFO, ros2.RIGHT_INFO, ros2.ODOMETRY, ros2.TRUE_POSE)
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of a topic: messages of one of these types; `keep` makes of one, decoded, what is held in memory.
+
+    once: only of the first one. Without `keep` no more is kept than where each message lies.
+    """
+
+    types: tuple[str, ...]
+    keep: Callable[[Any], Any] | None = None
+    once: bool = False
 
 
 @dataclass(frozen=True)
@@ -27,27 +42,33 @@ class Location:
 
 @dataclass
 class Contents:
-    """What a scan found. messages: topic -> header stamp [ns] -> place; small: decoded, by the same keys.
+    """What a scan found of what was wanted. messages: topic -> header stamp [ns] -> place; small: what was kept of
+    them, by the same keys; types: the type of each topic's messages, whether wanted or not.
 
-    damage says what ended the reading early, None for a file that reads to its end.
+    unstamped: topics all of whose messages have one and the same header stamp; the keys are then the times at which
+    they were written to the file (log_time). repeats: by topic, how many messages have the stamp of an earlier one, and
+    are not here. damage says what ended the reading early, None for a file that reads to its end.
     """
 
     messages: dict[str, dict[int, Location]] = field(default_factory=dict)
     small: dict[str, dict[int, Any]] = field(default_factory=dict)
+    types: dict[str, str] = field(default_factory=dict)
     static_transforms: list[Any] = field(default_factory=list)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, int] = field(default_factory=dict)
+    unstamped: set[str] = field(default_factory=set)
+    repeats: dict[str, int] = field(default_factory=dict)
     damage: str | None = None
 
 
-def scan(path: Path) -> Contents:
-    """Read the whole file once, keeping places and small messages, and stop at the first damage.
+def scan(path: Path, wanted: Mapping[str, Wanted]) -> Contents:
+    """Read the whole file once, keeping places and small messages of the topics wanted; stop at the first damage.
 
     Every chunk's checksum is checked here, so what was found can be read later.
     Raises RecordingError when the file cannot be opened or is no MCAP file.
     """
     with ClippedFile(path) as file:
-        reader = _Scanner(file)
+        reader = _Scanner(file, wanted)
         try:
             reader.run()
         except Exception as error:
@@ -56,20 +77,23 @@ def scan(path: Path) -> Contents:
                 raise RecordingError(f"{path}: not an MCAP file, or cut off in its first bytes") from error
             what = str(error) or type(error).__name__
             reader.contents.damage = f"damaged or cut off at byte {reader.offset}: {what}"
+    reader.use_log_times()
     return reader.contents
 
 
 class _Scanner:
-    def __init__(self, file: "ClippedFile") -> None:
+    def __init__(self, file: "ClippedFile", wanted: Mapping[str, Wanted]) -> None:
         self.contents = Contents()
         self.started = False
         self.offset = 0
         self._file = file
+        self._wanted = wanted
         self._topics: dict[int, str] = {}
         self._schema_names: dict[int, str] = {}
         self._n_messages = 0
         self._stamp = ros2.decoder("std_msgs/msg/Header")
-        self._decoders = {topic: ros2.decoder(ros2.TOPICS[topic]) for topic in _HELD_IN_MEMORY}
+        # By the time of writing, of topics that have had but one header stamp so far.
+        self._logged = Contents()
 
     def run(self) -> None:
         for record in _stream_reader(self._file).records:
@@ -77,13 +101,22 @@ class _Scanner:
             self._take(record)
             self.offset = self._file.tell()
 
+    def use_log_times(self) -> None:
+        """At the end: for topics whose header stamps say nothing."""
+        contents = self.contents
+        for topic, places in self._logged.messages.items():
+            if len(places) >= UNSTAMPED:
+                contents.messages[topic], contents.small[topic] = places, self._logged.small.get(topic, {})
+                contents.unstamped.add(topic)
+                contents.repeats[topic] -= len(places) - 1
+
     def _take(self, record: McapRecord) -> None:
         contents = self.contents
         if isinstance(record, Chunk):
             for number, inner in enumerate(open_chunk(record)):
                 self._take_data(inner, Location(self.offset, number))
         elif isinstance(record, Metadata):
-            contents.metadata[record.name] = record.metadata
+            contents.metadata.setdefault(record.name, {}).update(record.metadata)
         elif isinstance(record, Attachment):
             contents.attachments[record.name] = self.offset
         elif isinstance(record, Statistics) and record.message_count != self._n_messages:
@@ -95,29 +128,45 @@ class _Scanner:
         if isinstance(record, Schema):
             self._schema_names[record.id] = record.name
         elif isinstance(record, Channel):
-            schema_name = self._schema_names.get(record.schema_id)
-            if record.message_encoding == "cdr" and ros2.TOPICS.get(record.topic) == schema_name:
+            type_name = self._schema_names.get(record.schema_id, "")
+            first = self.contents.types.setdefault(record.topic, type_name)
+            wanted = self._wanted.get(record.topic)
+            if wanted and record.message_encoding == "cdr" and type_name == first and type_name in wanted.types:
                 self._topics[record.id] = record.topic
         elif isinstance(record, Message):
             self._n_messages += 1
             if record.channel_id in self._topics:
-                self._take_message(self._topics[record.channel_id], record.data, location)
+                self._take_message(self._topics[record.channel_id], record, location)
 
-    def _take_message(self, topic: str, data: bytes, location: Location) -> None:
-        if topic == ros2.TF_STATIC:
+    def _take_message(self, topic: str, message: Message, location: Location) -> None:
+        data = message.data
+        type_name = self.contents.types[topic]
+        if type_name == TRANSFORMS:
             # It has no header of its own.
-            self.contents.static_transforms.extend(self._decoders[topic](data).transforms)
-            return
-        if topic == ros2.TRUE_MOVERS:
-            transforms = ros2.decoder(ros2.TOPICS[topic])(data).transforms
-            if not transforms:
+            transforms = ros2.decoder(type_name)(data).transforms
+            if topic == ros2.TF_STATIC:
+                self.contents.static_transforms.extend(transforms)
+            if topic == ros2.TF_STATIC or not transforms:
                 return
             stamp_ns = ros2.header_stamp_ns(transforms[0].header)
         else:
             stamp_ns = ros2.header_stamp_ns(self._stamp(data))
-        if topic in self._decoders:
-            self.contents.small.setdefault(topic, {}).setdefault(stamp_ns, self._decoders[topic](data))
-        self.contents.messages.setdefault(topic, {}).setdefault(stamp_ns, location)
+        self._keep(self.contents, topic, stamp_ns, data, location)
+        if len(self.contents.messages[topic]) > 1:
+            self._logged.messages.pop(topic, None)
+            self._logged.small.pop(topic, None)
+        else:
+            self._keep(self._logged, topic, min(message.log_time, LAST_STAMP_NS), data, location)
+
+    def _keep(self, held: Contents, topic: str, stamp_ns: int, data: bytes, location: Location) -> None:
+        places, wanted = held.messages.setdefault(topic, {}), self._wanted[topic]
+        if stamp_ns in places:
+            held.repeats[topic] = held.repeats.get(topic, 0) + 1
+            return
+        if wanted.keep is not None and not (wanted.once and held.small.get(topic)):
+            decoded = ros2.decoder(self.contents.types[topic])(data)
+            held.small.setdefault(topic, {})[stamp_ns] = wanted.keep(decoded)
+        places[stamp_ns] = location
 
 
 class ClippedFile:

@@ -1,25 +1,18 @@
 """Writes observations as ROS 2 messages to an MCAP file that stays readable when the run is killed."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
-
-import mcap_ros2.writer
 
 from ..camera import StereoCamera
-from ..errors import InvalidInputError, RecordingError
+from ..errors import InvalidInputError
 from ..geometry import FloatArray, as_pose
 from ..observation import Observation
 from . import ros2_messages as ros2
-from .ros2_schemas import SCHEMAS
+from .ros2_file import Ros2File
 
-FORMAT_VERSION = "1"
-METADATA_NAME = "stereogrid"
-NOTE_NAME = "stereogrid/note"
 MESH_NAME = "truth_mesh.ply"
+_MESH_TYPE = "model/ply"
 
 
 class McapWriter:
@@ -50,23 +43,14 @@ class McapWriter:
         self.path = Path(path)
         self.camera = camera
         self.T_base_cam = as_pose(T_base_cam, "T_base_cam")
-        own = {"format_version": FORMAT_VERSION, "stereogrid_version": _library_version()}
-        checked = _checked_metadata(metadata or {}, own)
         self._last_stamp_ns: int | None = None
         self._last_tick_ns: int | None = None
-        self._file = self._open("wb" if overwrite else "xb")
-        with self._reporting():
-            # A limit of zero bytes closes a chunk after every message.
-            self._mcap = mcap_ros2.writer.Writer(self._file, chunk_size=0)
-            self._schemas = {
-                name: self._mcap.register_msgdef(name, SCHEMAS[name]) for name in sorted(set(ros2.TOPICS.values()))
-            }
-            self._mcap.add_metadata(METADATA_NAME, checked)
-            if truth_mesh_ply is not None:
-                self._mcap.add_attachment(0, 0, MESH_NAME, "model/ply", truth_mesh_ply)
-            for name, mesh_ply in (mover_meshes_ply or {}).items():
-                self._mcap.add_attachment(0, 0, mover_mesh_name(name), "model/ply", mesh_ply)
-            self._file.flush()
+        self._file = Ros2File(path, ros2.TOPICS, metadata=metadata or {}, overwrite=overwrite)
+        if truth_mesh_ply is not None:
+            self._file.attach(MESH_NAME, _MESH_TYPE, truth_mesh_ply)
+        for name, mesh_ply in (mover_meshes_ply or {}).items():
+            self._file.attach(mover_mesh_name(name), _MESH_TYPE, mesh_ply)
+        self._file.flush()
 
     def write_tick(self, stamp_s: float, T_world_base: FloatArray, wheels_rad: FloatArray) -> None:
         """Append the robot's true pose (4, 4) and the turns (2,) of its wheels [rad] at a time between observations.
@@ -77,16 +61,13 @@ class McapWriter:
         stamp_ns = ros2.stamp_to_ns(stamp_s)
         if self._last_tick_ns is not None and stamp_ns <= self._last_tick_ns:
             raise InvalidInputError(f"ticks' stamps must increase: {stamp_s} s follows {self._last_tick_ns / 1e9} s")
-        with self._reporting():
-            self._message(ros2.TRUE_BASE, stamp_ns, ros2.true_pose_message(stamp_ns, T_world_base))
-            self._message(ros2.WHEELS, stamp_ns, ros2.wheels_message(stamp_ns, wheels_rad))
+        self._file.write(ros2.TRUE_BASE, stamp_ns, ros2.true_pose_message(stamp_ns, T_world_base))
+        self._file.write(ros2.WHEELS, stamp_ns, ros2.wheels_message(stamp_ns, wheels_rad))
         self._last_tick_ns = stamp_ns
 
     def write_note(self, key: str, text: str) -> None:
         """Add to the metadata what became known while recording, such as why it ended; one note a recording."""
-        with self._reporting():
-            self._mcap.add_metadata(NOTE_NAME, _checked_metadata({key: text}, own={}))
-            self._file.flush()
+        self._file.note(key, text)
 
     def write(self, observation: Observation) -> None:
         """Append one observation.
@@ -95,20 +76,17 @@ class McapWriter:
         RecordingError when the file cannot be written.
         """
         stamp_ns = self._checked_stamp_ns(observation)
-        with self._reporting():
-            if self._last_stamp_ns is None:
-                self._message(ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam))
-            # The right image comes last: an observation that has it is whole.
-            for topic, message in self._messages(stamp_ns, observation):
-                self._message(topic, stamp_ns, message)
-            self._file.flush()
+        if self._last_stamp_ns is None:
+            self._file.write(ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam))
+        # The right image comes last: an observation that has it is whole.
+        for topic, message in self._messages(stamp_ns, observation):
+            self._file.write(topic, stamp_ns, message)
+        self._file.flush()
         self._last_stamp_ns = stamp_ns
 
     def close(self) -> None:
         """Write the index and close the file; closing again does nothing."""
-        if not self._file.closed:
-            with self._reporting(), self._file:
-                self._mcap.finish()
+        self._file.close()
 
     def __enter__(self) -> "McapWriter":
         return self
@@ -132,9 +110,6 @@ class McapWriter:
         yield ros2.LEFT_IMAGE, ros2.image_message(stamp_ns, observation.left)
         yield ros2.RIGHT_IMAGE, ros2.image_message(stamp_ns, observation.right)
 
-    def _message(self, topic: str, stamp_ns: int, message: ros2.Message) -> None:
-        self._mcap.write_message(topic, self._schemas[ros2.TOPICS[topic]], message, stamp_ns, stamp_ns)
-
     def _checked_stamp_ns(self, observation: Observation) -> int:
         truth = observation.truth
         depth = None if truth is None else truth.depth_m
@@ -148,41 +123,7 @@ class McapWriter:
             )
         return stamp_ns
 
-    def _open(self, mode: str) -> BinaryIO:
-        try:
-            file: BinaryIO = self.path.open(mode)  # type: ignore[assignment]
-        except FileExistsError:
-            raise RecordingError(
-                f"{self.path}: exists already; choose another path (in Python: or overwrite=True)"
-            ) from None
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-        return file
-
-    @contextmanager
-    def _reporting(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be written: {error.strerror}") from error
-
 
 def mover_mesh_name(name: str) -> str:
     """What the mesh of a mover is called among the file's attachments."""
     return f"mover/{name}.ply"
-
-
-def _checked_metadata(metadata: Mapping[str, str], own: dict[str, str]) -> dict[str, str]:
-    for key, value in metadata.items():
-        if not isinstance(key, str) or not isinstance(value, str):
-            raise InvalidInputError(f"metadata must be text: {key!r} is {value!r}")
-        if key in own:
-            raise InvalidInputError(f"metadata {key!r} is written by the recording itself")
-    return {**own, **metadata}
-
-
-def _library_version() -> str:
-    try:
-        return version("stereogrid")
-    except PackageNotFoundError:
-        return "unknown"

@@ -1,6 +1,6 @@
 """Poses, cameras and images as ROS 2 messages: built as dicts, read from what mcap_ros2 decodes."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
 from typing import Any, TypeAlias
@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
@@ -49,6 +51,7 @@ WHEEL_NAMES = ["left_wheels", "right_wheels"]
 CAMERA_FRAME = "left_camera_optical"
 BASE_FRAME = "base_link"
 
+_UNIT_TOLERANCE = 1e-3
 _LAST_STAMP_NS = (2**31 - 1) * 10**9
 
 
@@ -179,7 +182,7 @@ def read_transform(translation: Any, rotation: Any, name: str) -> FloatArray:
     t_m = [translation.x, translation.y, translation.z]
     if not (np.isfinite(wxyz).all() and np.isfinite(t_m).all()):
         raise InvalidInputError(f"{name} contains NaN or infinity")
-    if abs(np.linalg.norm(wxyz) - 1) > 1e-3:
+    if abs(np.linalg.norm(wxyz) - 1) > _UNIT_TOLERANCE:
         raise InvalidInputError(f"{name} has no unit quaternion: w, x, y, z = {wxyz.tolist()}")
     return as_pose(from_quaternion_wxyz(wxyz, t_m), name)
 
@@ -187,6 +190,23 @@ def read_transform(translation: Any, rotation: Any, name: str) -> FloatArray:
 def read_pose(pose: Any, name: str) -> FloatArray:
     """(4, 4) of a decoded geometry_msgs/Pose. Raises InvalidInputError, naming `name`."""
     return read_transform(pose.position, pose.orientation, name)
+
+
+def read_poses(poses: Sequence[Any]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """(K, 4, 4) of decoded geometry_msgs/Pose, and which of them (K,) are none: not finite, or no unit quaternion."""
+    numbers = np.array(
+        [[each.position.x, each.position.y, each.position.z, *_xyzw(each.orientation)] for each in poses]
+    ).reshape(-1, 7)
+    wrong = ~np.isfinite(numbers).all(axis=1) | ~(np.abs(np.linalg.norm(numbers[:, 3:], axis=1) - 1) <= _UNIT_TOLERANCE)
+    numbers[wrong] = [0, 0, 0, 0, 0, 0, 1]
+    T = np.tile(np.eye(4), (len(numbers), 1, 1))
+    T[:, :3, :3] = Rotation.from_quat(numbers[:, 3:]).as_matrix()
+    T[:, :3, 3] = numbers[:, :3]
+    return T, wrong
+
+
+def _xyzw(rotation: Any) -> tuple[float, float, float, float]:
+    return rotation.x, rotation.y, rotation.z, rotation.w
 
 
 def read_static_transform(transforms: Iterable[Any]) -> FloatArray:

@@ -18,6 +18,11 @@ _PARTS = {
     "geometry_msgs/TransformStamped": (
         "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform"
     ),
+    "diagnostic_msgs/KeyValue": "string key\nstring value",
+    "diagnostic_msgs/DiagnosticStatus": (
+        "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\n"
+        "byte level\nstring name\nstring message\nstring hardware_id\nKeyValue[] values"
+    ),
     "sensor_msgs/RegionOfInterest": ("uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify"),
 }
 
@@ -54,6 +59,24 @@ SCHEMAS = {
         "geometry_msgs/TwistWithCovariance",
         "geometry_msgs/Twist",
         "geometry_msgs/Vector3",
+    ),
+    "sensor_msgs/msg/Range": _schema(
+        "uint8 ULTRASOUND=0\nuint8 INFRARED=1\nstd_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n"
+        "float32 min_range\nfloat32 max_range\nfloat32 range\nfloat32 variance",
+        *_STAMPED,
+    ),
+    "sensor_msgs/msg/BatteryState": _schema(
+        "std_msgs/Header header\nfloat32 voltage\nfloat32 temperature\nfloat32 current\nfloat32 charge\n"
+        "float32 capacity\nfloat32 design_capacity\nfloat32 percentage\nuint8 power_supply_status\n"
+        "uint8 power_supply_health\nuint8 power_supply_technology\nbool present\nfloat32[] cell_voltage\n"
+        "float32[] cell_temperature\nstring location\nstring serial_number",
+        *_STAMPED,
+    ),
+    "diagnostic_msgs/msg/DiagnosticArray": _schema(
+        "std_msgs/Header header\nDiagnosticStatus[] status",
+        *_STAMPED,
+        "diagnostic_msgs/DiagnosticStatus",
+        "diagnostic_msgs/KeyValue",
     ),
     "sensor_msgs/msg/JointState": _schema(
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort", *_STAMPED

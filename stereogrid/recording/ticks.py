@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from ..errors import InvalidInputError
-from ..geometry import FloatArray, from_rotation
+from ..geometry import FloatArray, between
 from ..observation import Recording
 
 
@@ -46,8 +45,7 @@ class Ticks:
             return end
         times, poses = self.stamp_s[k - 1 : k + 1], self.T_world_base[k - 1 : k + 1]
         share = (time_s - times[0]) / (times[1] - times[0])
-        turn = Slerp([0.0, 1.0], Rotation.from_matrix(poses[:, :3, :3]))(share)
-        return from_rotation(turn.as_matrix(), (1 - share) * poses[0, :3, 3] + share * poses[1, :3, 3])
+        return between(poses[0], poses[1], share)
 
 
 @runtime_checkable

@@ -7,11 +7,22 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from stereogrid.calibration import StereoCalibration
 from stereogrid.camera import StereoCamera
 from stereogrid.geometry import R_BASE_OPTICAL, as_pose, from_rotation, from_yaw
 from stereogrid.observation import Observation, Odometry, Recording, Truth
-from stereogrid.recording import McapWriter, ShuffledPoses, Subset, TruePoses, open_recording, poses
+from stereogrid.recording import (
+    McapWriter,
+    RawReport,
+    RawWriter,
+    ShuffledPoses,
+    Subset,
+    TruePoses,
+    open_recording,
+    poses,
+)
 
 CAMERA = StereoCamera(focal_px=40, cx_px=15.5, cy_px=11.5, baseline_m=0.06, width_px=32, height_px=24)
 N = 6
@@ -28,6 +39,20 @@ def mcap(folder: Path) -> Recording:
             truth = Truth(from_yaw(0.01, [0, 0, 0.1]) @ T_world_cam)
             writer.write(Observation(0.1 * i, left, right, Odometry(T_odom_base), T_world_cam, truth))
     return open_recording(folder / "drive.mcap")
+
+
+def raw(folder: Path) -> Recording:
+    """Each picture and each report of the robot at a time of its own, through lenses that bend and a crooked mount."""
+    rng = np.random.default_rng(2)
+    turn = Rotation.from_rotvec([0.01, -0.02, 0.015]).as_matrix()
+    K, distortion = CAMERA.K, np.array([-0.1, 0.02, 0.001, 0.0])
+    rig = StereoCalibration((K, K), (distortion, distortion), from_rotation(turn, [-0.06, 0.001, 0]), (32, 24))
+    with RawWriter(folder / "raw.mcap", rig, from_rotation(R_BASE_OPTICAL, [0.1, 0.03, 0.4])) as writer:
+        for i in range(N):
+            writer.write_report(RawReport(0.1 * i, from_yaw(0.1 * i, [0.2 * i, 0, 0])))
+            left, right = rng.integers(0, 256, (2, *CAMERA.shape), dtype=np.uint8)
+            writer.write_pair(left, right, 0.1 * i + 0.03, 0.1 * i + 0.04)
+    return open_recording(folder / "raw.mcap")
 
 
 def kitti(folder: Path) -> Recording:
@@ -50,6 +75,7 @@ def real_kitti(folder: Path) -> Recording:
 
 MAKERS: dict[str, Callable[[Path], Recording]] = {
     "mcap": mcap,
+    "raw": raw,
     "kitti": kitti,
     "real_kitti": real_kitti,
     "true_poses": lambda folder: TruePoses(mcap(folder)),

@@ -28,12 +28,12 @@ from sim.firmware.loop import Loop
 from sim.firmware.pacer import Pacer
 from sim.firmware.serve import serve
 from sim.firmware.tcp import TcpLink
-from sim.mjpeg import MjpegServer
 from sim.rig import MINORU, mount
 from sim.robot.pioneer import TICK_S, Pioneer
 from sim.worlds.world import make_world
 from stereogrid.cli import run
 from stereogrid.errors import InvalidInputError
+from stereogrid.mjpeg import MjpegServer
 
 ROOT = Path(__file__).parents[2]
 
@@ -144,7 +144,7 @@ def test_an_interrupt_while_it_is_loaded_ends_it_too(
     def held() -> Iterator[Callable[[], bool]]:
         yield lambda: True
 
-    monkeypatch.setattr("sim.interrupts.held_interrupts", held)
+    monkeypatch.setattr("stereogrid.interrupts.held_interrupts", held)
     assert run(app, ["firmware", "corridor"]) == 0
     assert capsys.readouterr().err == "stopped\n"
 

@@ -8,11 +8,16 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from stereogrid.calibration import (
+    BoardViews,
     Chessboard,
     StereoCalibration,
     calibrate_corners,
     calibrate_stereo,
+    calibrate_views,
+    far_pairs,
     find_corners,
+    residuals,
+    without_far_pairs,
 )
 from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import from_rotation
@@ -124,6 +129,13 @@ def test_thirteen_real_pairs_are_calibrated_to_a_fraction_of_a_pixel(real_pairs)
     assert found.baseline_m == pytest.approx(3.344 * 0.025, rel=0.01)
 
 
+def test_columns_and_rows_may_be_named_the_other_way_round(real_pairs):
+    pairs, names = real_pairs
+    found = calibrate_stereo(pairs, Chessboard(6, 9, 0.025), names)
+    assert found.n_pairs == 13 and found.errors.stereo_rms_px <= 0.45
+    assert found.baseline_m == pytest.approx(3.344 * 0.025, rel=0.01)
+
+
 def test_real_pairs_without_a_board_are_left_out_by_name(real_pairs):
     pairs, names = real_pairs
     blank = np.full((480, 640), 90, np.uint8)
@@ -144,6 +156,34 @@ def test_pictures_of_different_moments_are_refused():
         calibrate_corners(left, np.roll(right, 1, axis=0), BOARD, SIZE)
 
 
+def test_one_pair_of_two_moments_among_many_is_named_and_can_be_left_out():
+    left, right = seen(12, noise_px=0.1)
+    right[4] = seen(13, noise_px=0.1)[1][12]
+    views = BoardViews(BOARD, SIZE, tuple("abcdefghijkl"), (left, right))
+    with pytest.raises(
+        InvalidInputError, match=r"do not fit: rms .* of the same moments\? e: its corners .*far as usual$"
+    ):
+        calibrate_views(views)
+    found = calibrate_views(without_far_pairs(views))
+    assert found.n_pairs == 11 and [line[:2] for line in found.left_out] == ["e:"]
+    assert found.baseline_m == pytest.approx(RIG.baseline_m, rel=0.002)
+
+
+def test_a_bent_board_is_named_where_the_fit_still_stands():
+    left, right = seen(12, noise_px=0.1)
+    left[7] += 1.5 * np.sin(np.arange(54))[:, None]
+    views = BoardViews(BOARD, SIZE, tuple("abcdefghijkl"), (left, right))
+    found = calibrate_views(views)
+    assert list(far_pairs(views.names, residuals(found, views.corners, BOARD).rms_px)) == ["h"]
+    assert without_far_pairs(views).names == tuple("abcdefgijkl")
+
+
+def test_pairs_that_are_alike_are_all_kept():
+    left, right = seen(12, noise_px=0.3)
+    names = tuple("abcdefghijkl")
+    assert without_far_pairs(BoardViews(BOARD, SIZE, names, (left, right))).names == names
+
+
 def test_corners_that_determine_nothing_are_refused():
     with pytest.raises(InvalidInputError, match="tilt the board in more ways"):
         calibrate_corners(*[np.full((8, 54, 2), 5.0)] * 2, BOARD, SIZE)
@@ -152,9 +192,12 @@ def test_corners_that_determine_nothing_are_refused():
 def test_too_few_pairs_and_those_without_a_board_are_named():
     blank = np.full((480, 640), 128, np.uint8)
     with pytest.raises(
-        InvalidInputError, match=r"only 0 of 2 .*5 are needed; pair 1: .* right image; pair 2: .* left and"
+        InvalidInputError,
+        match=r"none of 2 pairs .* board of 9x6 inner corners .*; pair 1: .* right image; pair 2: .* left and",
     ):
         calibrate_stereo([(drawn(), blank), (blank, blank)], BOARD)
+    with pytest.raises(InvalidInputError, match=r"only 1 of 5 .* 5 are needed; pair 2: .*; pair 4: .*; and 1 more"):
+        calibrate_stereo([(drawn(), drawn()), *[(blank, blank)] * 4], BOARD)
     with pytest.raises(InvalidInputError, match="no pairs"):
         calibrate_stereo([], BOARD)
     with pytest.raises(InvalidInputError, match="4 pairs are too few"):

@@ -10,7 +10,7 @@ import pytest
 from stereogrid import runs
 from stereogrid.errors import InvalidInputError
 from stereogrid.files import check_writable, written_beside
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.runs import check_runs, finished_path, run_folder
 
 FAILURES = [ValueError, KeyboardInterrupt, SystemExit]
 
@@ -178,6 +178,14 @@ def test_many_runs_at_once_never_share_a_folder(tmp_path):
     assert len(finished) == len({path for path, _ in finished}) == 80
     assert all((path / "metrics.json").read_text() == text for path, text in finished)
     assert len(names(tmp_path)) == 81
+
+
+def test_asking_whether_results_could_be_written_leaves_nothing_but_their_folder(tmp_path):
+    check_runs(tmp_path / "runs")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "runs"]
+    (tmp_path / "file").touch()
+    with pytest.raises(InvalidInputError, match="file/runs: results cannot be written there"):
+        check_runs(tmp_path / "file" / "runs")
 
 
 def test_results_that_cannot_be_written_are_refused_by_place(tmp_path):

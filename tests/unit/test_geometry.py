@@ -10,6 +10,7 @@ from stereogrid.errors import InvalidInputError, StereogridError, unknown_name
 from stereogrid.geometry import (
     R_BASE_OPTICAL,
     as_pose,
+    between,
     from_quaternion_wxyz,
     from_rotation,
     from_yaw,
@@ -62,6 +63,15 @@ def test_quaternions_survive_the_way_through_a_matrix(q, t_m):
     # q and -q are one rotation; w >= 0 chooses.
     np.testing.assert_allclose(np.abs(back @ q), 1, atol=1e-9)
     assert back[0] >= 0
+
+
+@given(poses, poses, st.floats(0, 1))
+def test_between_two_poses_turn_and_way_are_shared_out(T_a_b, T_a_c, share):
+    T = as_pose(between(T_a_b, T_a_c, share))
+    way, turn = T_a_c[:3, 3] - T_a_b[:3, 3], rotation_angle_rad(inverse(T_a_b) @ T_a_c)
+    np.testing.assert_allclose(T[:3, 3] - T_a_b[:3, 3], share * way, atol=1e-9)
+    assert rotation_angle_rad(inverse(T_a_b) @ T) == pytest.approx(share * turn, abs=1e-6)
+    assert rotation_angle_rad(inverse(T) @ T_a_c) == pytest.approx((1 - share) * turn, abs=1e-6)
 
 
 def test_quaternions_are_written_w_first():

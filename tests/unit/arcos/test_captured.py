@@ -103,6 +103,19 @@ def test_the_session_has_no_bad_packet_however_it_is_split(
         assert (parser.bad, parser.skipped, parser.pending) == (0, 0, 0)
 
 
+def test_the_session_is_found_byte_by_byte_amid_garbage_and_false_headers(
+    session: dict[str, Any], streams: dict[str, bytes]
+) -> None:
+    garbage = (b"", b"\xfa", b"\xfa\xfb", b"\xfb\xfa\xfb\x01", b"WMS2\r", b"\xfa\xfb\x06\x0b;\xfa\0\0\0")
+    for way in streams:
+        sent = [bytes.fromhex(p["hex"]) for p in session["packets"] if p["dir"] == way]
+        noisy = b"".join(garbage[k % len(garbage)] + each for k, each in enumerate(sent))
+        parser = PacketParser()
+        found = [body for byte in noisy for body in parser.feed(bytes([byte]))]
+        assert [packet(body) for body in found] == sent
+        assert parser.skipped == len(noisy) - len(b"".join(sent)) and parser.pending == 0
+
+
 def test_the_clients_commands_are_understood(session: dict[str, Any]) -> None:
     for each in (p for p in session["packets"] if p["dir"] == "c2r"):
         command = Command.decode(bytes.fromhex(each["hex"])[3:-2])

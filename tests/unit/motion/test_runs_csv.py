@@ -8,7 +8,17 @@ import pytest
 from marked_runs import noisy_runs
 
 from stereogrid.errors import InvalidInputError
-from stereogrid.motion import FitOptions, Growth, MotionError, Run, Runs, fit_motion, read_runs, write_runs
+from stereogrid.motion import (
+    FitOptions,
+    Growth,
+    MotionError,
+    Run,
+    Runs,
+    append_readings,
+    fit_motion,
+    read_runs,
+    write_runs,
+)
 
 HEADER = "run,odo_x_m,odo_y_m,odo_heading_rad,true_x_m,true_y_m,true_heading_rad"
 ROWS = ["1,0,0,0,0,0,0", "1,1.01,0.02,0.01,1,0,0", "1,2.02,0.05,0.02,2,0,0"]
@@ -144,3 +154,44 @@ def test_a_run_is_straight_or_on_the_spot_or_neither():
     assert run(0.05, 1.5).kind == "turn"
     assert run(5.0, 1.5).kind == run(0.05, 0.1).kind == ""
     assert [each.kind for each in Runs((run(5.0, 0.1), run(0.0, -1.5)))] == ["straight", "turn"]
+
+
+def measured_run(name="4", surface="", marks=2):
+    rows = np.arange(marks + 1)[:, None] * [[1.0, 0.01, 0.02]]
+    return Run(name, rows * 1.01, rows, surface=surface)
+
+
+def test_readings_are_appended_in_the_columns_and_units_of_the_file(written):
+    path = written("true_heading_deg,surface,odo_x_mm,odo_y_cm,run,odo_heading_deg,true_x_cm,true_y_m", [])
+    path.write_text(path.read_text() + "0,tiles,0,0,a,0,0,0\n3,tiles,1010,2,a,5,100,0.01")
+    before = path.read_text()
+    append_readings(path, measured_run(surface="tiles"))
+    assert path.read_text().startswith(before + "\n")
+    first, second = read_runs(path)
+    assert first.name == "a"
+    np.testing.assert_allclose(second.odo, measured_run().odo, atol=1e-5)
+    np.testing.assert_allclose(second.true, measured_run().true, atol=1e-5)
+
+
+def test_a_run_may_be_appended_mark_by_mark(tmp_path):
+    path = tmp_path / "runs.csv"
+    for marks in (1, 2, 3):
+        append_readings(path, measured_run(marks=marks), 0 if marks == 1 else marks)
+        (run,) = read_runs(path)
+        np.testing.assert_allclose(run.true, measured_run(marks=marks).true, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        (f"{HEADER}\n" + "\n".join(ROWS), "has no column 'surface', and run 4 on tiles names one"),
+        ("hello\n", "runs.csv: its first row must name the columns"),
+        (f"{HEADER}\n1,0,0,0,0,0\n", "row 2 has 6 values"),
+    ],
+)
+def test_a_file_that_cannot_take_readings_is_left_as_it_is(tmp_path, content, named):
+    path = tmp_path / "runs.csv"
+    path.write_text(content)
+    with pytest.raises(InvalidInputError, match=named):
+        append_readings(path, measured_run(surface="tiles"))
+    assert path.read_text() == content

@@ -245,7 +245,7 @@ def test_the_page_shows_three_streams_on_the_loopback():
         if len(published) == 2:
             raise EnoughError
 
-    from sim.mjpeg import MjpegServer
+    from stereogrid.mjpeg import MjpegServer
 
     publish = MjpegServer.publish
     with pytest.MonkeyPatch.context() as patch, pytest.raises(EnoughError):

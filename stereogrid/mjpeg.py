@@ -2,7 +2,7 @@
 
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -14,10 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from stereogrid.errors import InvalidInputError
+from .errors import InvalidInputError
+from .loopback import HOST, is_foreign
 
-HOST = "127.0.0.1"
-LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")
 BOUNDARY = "frame"
 PATIENCE_S = 10.0
 """A client that neither asks nor reads for this long is let go."""
@@ -81,21 +80,31 @@ class MjpegServer:
     """Serves /left.mjpg, /right.mjpg, /left.jpg, /right.jpg, /camera.json and an index page, each client in a thread.
 
     port 0: any that is free. calibration: what /camera.json says. page: the index page. others: names of further
-    pictures, which are served alike. Use as a context manager; `publish` never waits for a client.
-    Raises InvalidInputError when the port is in use.
+    pictures, which are served alike. status: what /status.json says, asked for each time. buttons: what a POST to
+    /<name> by a page of this server does; both are called in threads of the clients.
+    Use as a context manager; `publish` never waits for a client. Raises InvalidInputError when the port is in use.
     """
 
     def __init__(
-        self, port: int, calibration: Mapping[str, Any], *, page: bytes = _INDEX, others: tuple[str, ...] = ()
+        self,
+        port: int,
+        calibration: Mapping[str, Any],
+        *,
+        page: bytes = _INDEX,
+        others: tuple[str, ...] = (),
+        status: Callable[[], Mapping[str, Any]] | None = None,
+        buttons: Mapping[str, Callable[[], None]] | None = None,
     ) -> None:
         if not 0 <= port <= 0xFFFF:
             raise InvalidInputError(f"a port must be 0 to 65535, not {port}")
+        said = json.dumps(calibration, indent=1).encode()
         try:
-            self._server = _Server(port, json.dumps(calibration, indent=1).encode(), page, ("left", "right", *others))
+            self._server = _Server(port, said, page, ("left", "right", *others))
         except OSError as error:
             raise InvalidInputError(
                 f"the pictures' port {port} cannot be had ({error.strerror}): choose another"
             ) from error
+        self._server.status, self._server.buttons = status, dict(buttons or {})
         self.port: int = self._server.server_address[1]
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), name="mjpeg", daemon=True)
         self._thread.start()
@@ -132,6 +141,8 @@ class _Server(ThreadingHTTPServer):
         super().__init__((HOST, port), _Handler)
         self.newest = Newest()
         self.calibration, self.page, self.names = calibration, page, names
+        self.status: Callable[[], Mapping[str, Any]] | None = None
+        self.buttons: dict[str, Callable[[], None]] = {}
         self._free = threading.BoundedSemaphore(MOST_CLIENTS)
 
     def server_bind(self) -> None:
@@ -159,18 +170,41 @@ class _Handler(BaseHTTPRequestHandler):
     def _ours(self) -> _Server:
         return cast(_Server, self.server)
 
+    def _is_for_us(self) -> bool:
+        """Whether no page of another site asks; it is told where one does."""
+        foreign = is_foreign(self.headers.get("Host"), self.headers.get("Origin"))
+        if foreign:
+            self.send_error(HTTPStatus.FORBIDDEN, "this server answers to its own pages, by names of the loopback only")
+        return not foreign
+
+    def do_POST(self) -> None:
+        if not self._ours.buttons:
+            self.send_error(HTTPStatus.NOT_IMPLEMENTED, "there is nothing to press here")
+            return
+        if not self._is_for_us():
+            return
+        # A browser always tells of whose page a POST is.
+        if self.headers.get("Origin") is None:
+            self.send_error(HTTPStatus.FORBIDDEN, "only a page of this server may press its buttons")
+            return
+        press = self._ours.buttons.get(self.path[1:])
+        if press is None:
+            self.send_error(HTTPStatus.NOT_FOUND)
+            return
+        press()
+        self.send_response(HTTPStatus.NO_CONTENT)
+        self.end_headers()
+
     def do_GET(self) -> None:
-        host = (self.headers.get("Host") or "").lower()
-        # A page of a foreign site whose name leads here must not see through the robot's eyes.
-        name = host if host.endswith("]") else host.rsplit(":", 1)[0]
-        if name not in LOCAL_NAMES:
-            self.send_error(HTTPStatus.FORBIDDEN, "this server answers to names of the loopback only")
+        if not self._is_for_us():
             return
         path = self.path.split("?", 1)[0]
         if path == "/":
             self._send(self._ours.page, "text/html; charset=utf-8")
         elif path == "/camera.json":
             self._send(self._ours.calibration, "application/json")
+        elif path == "/status.json" and self._ours.status is not None:
+            self._send(json.dumps(self._ours.status()).encode(), "application/json")
         elif path.endswith(".jpg") and path[1:-4] in self._ours.names:
             self._send_picture(path[1:-4])
         elif path.endswith(".mjpg") and path[1:-5] in self._ours.names:

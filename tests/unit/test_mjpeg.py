@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from sim.mjpeg import BOUNDARY, MOST_CLIENTS, MjpegServer
 from stereogrid.errors import InvalidInputError
+from stereogrid.loopback import is_foreign
+from stereogrid.mjpeg import BOUNDARY, MOST_CLIENTS, MjpegServer
 
 CALIBRATION = {"focal_px": 417.0, "T_base_cam": [[1.0, 0.0], [0.0, 1.0]]}
 
@@ -142,6 +143,36 @@ def test_names_of_the_loopback_are_welcome(server: MjpegServer, host: str) -> No
     assert get(server, "/camera.json", host=host)[0] == 200
 
 
+def press(server: MjpegServer, path: str, origin: str | None, host: str | None = None) -> int:
+    connection = HTTPConnection("127.0.0.1", server.port, timeout=20)
+    headers = {"Host": host or f"127.0.0.1:{server.port}"} | ({} if origin is None else {"Origin": origin})
+    connection.request("POST", path, headers=headers)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+def test_a_status_is_asked_for_each_time_and_buttons_are_pressed_by_the_page_alone() -> None:
+    pressed: list[str] = []
+    with MjpegServer(0, {}, status=lambda: {"n": len(pressed)}, buttons={"go": lambda: pressed.append("go")}) as server:
+        ours = f"http://127.0.0.1:{server.port}"
+        assert json.loads(get(server, "/status.json")[2]) == {"n": 0}
+        assert press(server, "/go", ours) == 204
+        assert press(server, "/go", f"http://LOCALHOST:{server.port}", f"localhost:{server.port}") == 204
+        assert json.loads(get(server, "/status.json")[2]) == {"n": 2}
+        assert press(server, "/stop", ours) == 404
+        for origin in ("http://evil.example", "null", None, "", f"https://127.0.0.1:{server.port}", "http://127.0.0.1"):
+            assert press(server, "/go", origin) == 403
+        # A name of theirs that leads here: host and origin agree, and are foreign.
+        assert press(server, "/go", "http://evil.example", "evil.example") == 403
+        assert get(server, "/go")[0] == 404
+    assert pressed == ["go", "go"]
+
+
+def test_without_a_status_there_is_none(server: MjpegServer) -> None:
+    assert get(server, "/status.json")[0] == 404
+
+
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "HEAD", "OPTIONS"])
 def test_only_get_is_answered(server: MjpegServer, method: str) -> None:
     assert get(server, "/camera.json", method=method)[0] == 501
@@ -150,3 +181,27 @@ def test_only_get_is_answered(server: MjpegServer, method: str) -> None:
 def test_a_port_in_use_is_named(server: MjpegServer) -> None:
     with pytest.raises(InvalidInputError, match=f"pictures' port {server.port} cannot be had"):
         MjpegServer(server.port, {})
+
+
+@pytest.mark.parametrize(
+    ("headers", "foreign"),
+    [
+        ({"Host": "localhost:8103"}, False),
+        ({"Host": "[::1]:8103", "Origin": "http://[::1]:8103"}, False),
+        ({"Host": "127.0.0.1.evil.example:8103"}, True),
+        ({"Host": "localhost:8103", "Origin": "http://localhost:8104"}, True),
+        ({}, True),
+    ],
+)
+def test_a_foreign_host_or_origin_is_known(headers: dict[str, str], foreign: bool) -> None:
+    assert is_foreign(headers.get("Host"), headers.get("Origin")) is foreign
+
+
+def test_a_page_of_another_site_that_asks_for_a_picture_is_refused(server: MjpegServer) -> None:
+    server.publish(jpeg(50), jpeg(150), 1.0)
+    own = f"127.0.0.1:{server.port}"
+    for origin, expected in ((f"http://{own}", 200), ("http://evil.example", 403), ("null", 403)):
+        connection = HTTPConnection("127.0.0.1", server.port, timeout=20)
+        connection.request("GET", "/left.jpg", headers={"Host": own, "Origin": origin})
+        assert connection.getresponse().status == expected
+        connection.close()

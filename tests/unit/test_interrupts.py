@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from sim.interrupts import held_interrupts, undisturbed
+from stereogrid.interrupts import held_interrupts, undisturbed
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

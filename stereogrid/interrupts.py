@@ -7,8 +7,10 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def held_interrupts() -> Iterator[Callable[[], bool]]:
+def held_interrupts(*others: signal.Signals) -> Iterator[Callable[[], bool]]:
     """Within it an interrupt (SIGINT) or a request to terminate does no more than make the function given true.
+
+    others: signals that shall do the same.
 
     Raised in the midst of a kernel of Numba it would come out as another error, and in a destructor as none.
     """
@@ -16,7 +18,7 @@ def held_interrupts() -> Iterator[Callable[[], bool]]:
     if threading.current_thread() is not threading.main_thread():  # where no signal arrives
         yield stop.is_set
         return
-    before = {each: signal.signal(each, lambda *_: stop.set()) for each in (signal.SIGINT, signal.SIGTERM)}
+    before = {each: signal.signal(each, lambda *_: stop.set()) for each in (signal.SIGINT, signal.SIGTERM, *others)}
     try:
         yield stop.is_set
     finally:

@@ -1,0 +1,1 @@
+"""From live pictures or files of a chessboard to a calibration."""

@@ -1,0 +1,1 @@
+"""Mapping while the robot drives."""

@@ -1,0 +1,5 @@
+"""Maps in the browser, by viser: the extra `view`."""
+
+from .live import LiveView
+
+__all__ = ["LiveView"]

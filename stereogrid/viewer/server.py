@@ -1,0 +1,62 @@
+"""viser's server on this machine's loopback, shut to pages of other sites."""
+
+import io
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
+from typing import Any
+
+from ..errors import InvalidInputError, MissingExtraError
+from ..loopback import HOST, is_foreign
+
+MISSING = 'a view in the browser needs viser: pip install "stereogrid[view]"'
+
+
+def open_server(port: int, title: str) -> Any:
+    """A running viser.ViserServer; a port that is taken gives way to the next free one, 0 is any.
+
+    viser itself answers whoever asks: a page of another site, open in the same browser, could see through the robot's
+    eyes. Here a foreign Host or Origin is refused. Raises MissingExtraError without viser.
+    """
+    if not 0 <= port <= 0xFFFF:
+        raise InvalidInputError(f"a port must be 0 to 65535, not {port}")
+    try:
+        import viser
+        import websockets.asyncio.server as websocket_server
+    except ImportError as error:
+        raise MissingExtraError(MISSING) from error
+    with _guarded(websocket_server) as guarded, redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=HOST, port=port, label=title, verbose=False)
+        if not guarded():
+            close_server(server)
+            raise MissingExtraError("this version of viser serves in a way that cannot be shut to other sites")
+    # Sharing would open a tunnel to the whole world.
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+def close_server(server: Any) -> None:
+    """Stop it, without its line on stdout."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+@contextmanager
+def _guarded(websocket_server: Any) -> Iterator[Callable[[], bool]]:
+    """Within it, servers that are started refuse what is foreign; the yielded function tells whether one was."""
+    serve, used = websocket_server.serve, []
+
+    def serve_own(*args: Any, process_request: Callable[[Any, Any], Any], **options: Any) -> Any:
+        def check(connection: Any, request: Any) -> Any:
+            if is_foreign(request.headers.get("Host"), request.headers.get("Origin")):
+                return connection.respond(HTTPStatus.FORBIDDEN, "only this server's own page may ask\n")
+            return process_request(connection, request)
+
+        used.append(True)
+        return serve(*args, process_request=check, **options)
+
+    websocket_server.serve = serve_own
+    try:
+        yield lambda: bool(used)
+    finally:
+        websocket_server.serve = serve
