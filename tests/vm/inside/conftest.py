@@ -15,10 +15,11 @@ def _vivid() -> Vivid:
 
 
 @pytest.fixture
-def vivid(_vivid: Vivid) -> Vivid:
-    """Two cameras as they are when plugged in new."""
+def vivid(_vivid: Vivid) -> Iterator[Vivid]:
+    """Two cameras as they are when plugged in new; unplugged afterwards, for who counts cameras."""
     _vivid.renew()
-    return _vivid
+    yield _vivid
+    _vivid.unplug()
 
 
 @pytest.fixture(scope="session")

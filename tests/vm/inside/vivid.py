@@ -21,13 +21,13 @@ class Vivid:
 
     def renew(self) -> None:
         """Unplug and plug in both: every control is what it is at first."""
-        if (DRIVER / "vivid.0").exists():
-            self.unplug()
+        self.unplug()
         self.plug()
 
     def unplug(self) -> None:
-        """Both: their nodes go."""
-        (DRIVER / "unbind").write_text("vivid.0")
+        """Both, unless they are: their nodes go."""
+        if (DRIVER / "vivid.0").exists():
+            (DRIVER / "unbind").write_text("vivid.0")
 
     def plug(self) -> None:
         (DRIVER / "bind").write_text("vivid.0")
