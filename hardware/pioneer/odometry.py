@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 import arcos
-from stereogrid.geometry import from_yaw, yaw_rad
+from stereogrid import geometry
+from stereogrid.geometry import from_yaw
 from stereogrid.observation import Odometry
 
 from .limits import MM
@@ -126,10 +127,8 @@ def obstacle(sip: arcos.Sip) -> str:
 def between(a: RobotReport, b: RobotReport, stamp_s: float) -> Odometry:
     """The odometry at a moment from a's stamp to b's, in even motion."""
     share = (stamp_s - a.stamp_s) / (b.stamp_s - a.stamp_s)
-    Ta, Tb = a.odometry.T_odom_base, b.odometry.T_odom_base
-    turn_rad = math.remainder(yaw_rad(Tb) - yaw_rad(Ta), math.tau)
     return Odometry(
-        from_yaw(yaw_rad(Ta) + share * turn_rad, Ta[:3, 3] + share * (Tb[:3, 3] - Ta[:3, 3])),
+        geometry.between(a.odometry.T_odom_base, b.odometry.T_odom_base, share),
         travelled_m=a.odometry.travelled_m + share * (b.odometry.travelled_m - a.odometry.travelled_m),
         turned_rad=a.odometry.turned_rad + share * (b.odometry.turned_rad - a.odometry.turned_rad),
     )
