@@ -5,12 +5,14 @@ BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
 PYTHON_VERSION ?= 3.11
 PYTHON := .venv/bin/python
+# Files of tests side by side; each file's in their order.
+TEST_WORKERS ?= 2
 
 demo: .venv/ready
 	$(PYTHON) -m experiments corridor
 
 test: .venv/ready
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest -n $(TEST_WORKERS) --dist loadfile
 
 # What `make test` leaves out.
 test-slow: .venv/ready
@@ -65,7 +67,7 @@ $(UV):
 
 .venv/ready: $(UV) pyproject.toml
 	$(UV) venv --quiet --clear --python $(PYTHON_VERSION) .venv
-	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,hardware,view,score,test,oracle,bench,dev]"
+	$(UV) pip install --quiet --python $(PYTHON) --editable ".[sim,hardware,view,score,sweep,test,oracle,bench,dev]"
 	touch $@
 
 clean:

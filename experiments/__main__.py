@@ -1,5 +1,10 @@
 """`python -m experiments corridor`: the experiments, one command each."""
 
+from stereogrid.early import end_at_once
+
+if __name__ == "__main__":
+    end_at_once()
+
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -160,6 +165,30 @@ def claim_tune(config: ConfigFile = None, work: Work = WORK, runs: Runs = RUNS) 
     show(lambda stage, command: tune(chosen(TuneConfig, config), stage, runs=runs, work=work, command=command))
 
 
+@app.command(epilog="Example: python -m experiments sweep experiments/sweeps/matchers.toml")
+def sweep(
+    config: Annotated[Path, typer.Argument(help="What to vary, in which worlds, with which seeds: docs/sweeps.md.")],
+    scheduler: Annotated[str, typer.Option(help="Of a cluster: tcp://host:8786.  [processes of this machine]")] = "",
+    workers: Annotated[int, typer.Option(help="Processes here.  [as many as cores]")] = 0,
+    memory_gb: Annotated[float, typer.Option(help="Of each; one that takes more is ended.  [an equal share]")] = 0.0,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Try what failed once more.")] = False,
+    dashboard: Annotated[bool, typer.Option("--dashboard", help="dask's page, on 127.0.0.1:8787.")] = False,
+    work: Work = RUNS / "sweep",
+    runs: Runs = RUNS,
+) -> None:
+    """Map with any parameters x worlds x seeds, and say which are better, on which world, with which interval.
+
+    Stopped and started again it goes on where it was.
+    """
+    from .sweep import run
+    from .sweep_cluster import Place
+    from .sweep_config import load_sweep
+
+    given = load_sweep(config)
+    place = Place(scheduler, workers, memory_gb, dashboard)
+    show(lambda _stage, command: run(given, place=place, runs=runs, work=work, retry=retry_failed, command=command))
+
+
 @app.command(epilog="Example: python -m experiments motion --surfaces vinyl,gravel")
 def motion(
     config: ConfigFile = None,
@@ -227,6 +256,23 @@ def pictures(
     from .pictures import corridor_picture
 
     corridor_picture(run, out / "corridor.png")
+
+
+@app.command(epilog="Example: python -m experiments config corridor > mine.toml")
+def config(
+    experiment: Annotated[str, typer.Argument(help="The experiment's name.")],
+    out: Annotated[Path | None, typer.Argument(help="Write it there.  [on the screen]")] = None,
+    check: Annotated[Path | None, typer.Option(help="Say whether this file is fine, and print nothing else.")] = None,
+) -> None:
+    """Print an experiment's config.toml with every parameter, its unit and its default, for --config."""
+    from stereogrid.commands.config import show_config
+    from stereogrid.errors import unknown_name
+
+    from .configs import CONFIGS
+
+    if experiment not in CONFIGS:
+        raise unknown_name("experiment with a config", experiment, CONFIGS)
+    show_config(CONFIGS[experiment], f"python -m experiments {experiment}", out=out, check=check)
 
 
 def _show_drive(run: "Callable[..., tuple[Path, dict[str, Outcome]]]", config: object, **given: Path | None) -> None:

@@ -8,18 +8,22 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
+from typing import Annotated
 
 from sim.faults import camera_faults
 from sim.rig import MINORU
-from stereogrid.config import GridConfig, MappingConfig, save_config
+from stereogrid.config import GridConfig, MappingConfig
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapper import Mapper
 from stereogrid.mapping_run import Track
 from stereogrid.motion import Growth, MotionError
 from stereogrid.observation import Recording
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.scoring import Score
 from stereogrid.scoring.map_scores import ScoredMap
 from stereogrid.scoring.truth import MapTruth
@@ -28,7 +32,19 @@ from .budget_arms import FUSION, Arm, MapMade, budget_arms
 from .budget_oracles import Labelled, Recalibrated
 from .budget_report import Budget, Unit, write_results
 from .drive_experiment import bm_mapping
-from .drives import OBSTACLES_M, DriveConfig, about, open_drive, record, world_of
+from .drives import (
+    CAMERA_FAULTS,
+    DISTANCE,
+    EVERY,
+    N_SEEDS,
+    OBSTACLES,
+    OBSTACLES_M,
+    DriveConfig,
+    about,
+    open_drive,
+    record,
+    world_of,
+)
 from .faulty_drive import FaultyDrive
 from .parallel import Stage, counted, in_parallel, until
 
@@ -48,33 +64,29 @@ def budget_mapping() -> MappingConfig:
 
 @dataclass(frozen=True)
 class BudgetConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    worlds: one drive each, painted by world_seed, the first distance_m of its path [m] with a pair every every_m [m].
-    n_seeds: faults of the cameras and noise of the odometry are drawn with the seeds 1, 2, ... n_seeds. camera_faults:
-    see sim.faults.camera_faults. mapping.motion_error: how odometry errs, and what the map is told of it. finer: cells
-    made true are divided so often, and their map is then laid back into cells of the usual size; finest: the same once
-    more, in an arm of its own, 0: none. obstacles_m: heights above the ground of what is scored as obstacles [m].
-    """
-
-    worlds: tuple[str, ...] = ("corridor", "office", "entrance")
-    world_seed: int = 0
-    every_m: float = 0.25
-    distance_m: float = 15.0
-    n_seeds: int = 3
-    camera_faults: str = "minoru"
-    mapping: MappingConfig = field(default_factory=budget_mapping)
-    finer: int = 2
-    finest: int = 4
-    obstacles_m: tuple[float, ...] = OBSTACLES_M
+    worlds: Annotated[tuple[str, ...], Doc("One drive each.")] = ("corridor", "office", "entrance")
+    world_seed: Annotated[int, Doc("Paints and furnishes the worlds.", least=0)] = 0
+    every_m: Annotated[float, EVERY] = 0.25
+    distance_m: Annotated[float, DISTANCE] = 15.0
+    n_seeds: Annotated[int, N_SEEDS] = 3
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "minoru"
+    mapping: Annotated[
+        MappingConfig, Doc("How every arm maps; its motion_error is how odometry errs, and what the map is told.")
+    ] = field(default_factory=budget_mapping)
+    finer: Annotated[
+        int, Doc("Cells made true are divided so often, and their map laid back into cells of the usual size.", least=2)
+    ] = 2
+    finest: Annotated[int, Doc("The same once more, in an arm of its own: beyond finer, or 0 for none.")] = 4
+    obstacles_m: Annotated[tuple[float, ...], OBSTACLES] = OBSTACLES_M
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
         self.mapping.build_mapper(MINORU)
         if not self.worlds or len(set(self.worlds)) < len(self.worlds):
             raise InvalidInputError("worlds must name at least one world, and none twice")
-        if not self.n_seeds > 0:
-            raise InvalidInputError(f"n_seeds must be positive, not {self.n_seeds}")
+        check_fields(self, but=("finer",))
         if self.finer < 2 or (self.finest and self.finest <= self.finer):
             raise InvalidInputError(
                 f"finer must be 2 or more, and finest beyond it or 0, not {self.finer} and {self.finest}"
@@ -120,14 +132,15 @@ def run(
     recordings: drives to be used instead of new ones.
     """
     reused = [open_drive(path) for path in recordings]
-    with run_folder(runs, "budget") as folder:
-        save_config(config, folder / "config.toml")
+    first, *others = recordings or [None]
+    run_of = RunRecord.of("experiments budget", command, first, made=f"drive-{config.worlds[0]}.mcap")
+    with recorded_run(runs, "budget", run_of.reading(*(("recording", each) for each in others)), config) as folder:
         drives = reused or [
             open_drive(record(drive, folder / f"drive-{drive.world}.mcap", stage)) for drive in config.drives
         ]
         budget = Budget(measure(drives, config, stage), config.arms, config.finest)
         with stage("drawing", 1):
-            tables = write_results(folder, budget, facts=_facts(drives, command))
+            tables = write_results(folder, budget, facts=_facts(drives, command), config=config)
     return finished_path(folder), tables
 
 

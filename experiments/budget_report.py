@@ -105,7 +105,13 @@ class Budget:
         return {name: gaps[worlds == name] for name in dict.fromkeys(worlds.tolist())}
 
 
-def write_results(folder: Path, budget: Budget, *, facts: Mapping[str, str]) -> list[ReportTable]:
+def write_results(
+    folder: Path,
+    budget: Budget,
+    *,
+    facts: Mapping[str, str],
+    config: object = None,
+) -> list[ReportTable]:
     """Numbers, the figure and the report of the run; the tables for the screen."""
     from .budget_figure import budget_figure
 
@@ -126,6 +132,7 @@ def write_results(folder: Path, budget: Budget, *, facts: Mapping[str, str]) -> 
         facts=facts,
         meanings={f"obstacle_{name}": f"{meaning}; obstacles" for name, (_, meaning) in SCORE_NAMES.items()},
         tables=tables,
+        config=config,
     )
     (folder / "tables.md").write_text("\n".join(table.markdown for table in tables), encoding="utf-8")
     return readings

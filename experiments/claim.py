@@ -13,12 +13,14 @@ from functools import partial
 from pathlib import Path
 from threading import Event
 
-from stereogrid.config import MappingConfig, save_config
+from stereogrid.config import MappingConfig
 from stereogrid.errors import InvalidInputError
 from stereogrid.mapping_run import untracked
 from stereogrid.motion import MotionError
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.scoring import Score
 
 from .claim_config import Arm, ClaimConfig, NoiseConfig, TuneConfig, telling
@@ -29,7 +31,6 @@ from .claim_units import (
     CODE,
     CONTROLS,
     MAP,
-    NOT_CODE,
     PRIOR,
     SHUFFLED,
     TRUE_DEPTH,
@@ -39,8 +40,8 @@ from .claim_units import (
     Unit,
     scores_of,
 )
-from .drives import record
-from .kept import KeptScores, code_key, key_of
+from .kept import NO_SCORE_DEPENDS_ON, KeptScores, code_key, key_of
+from .kept_drives import kept_drive
 from .parallel import Stage, in_parallel, until
 
 TOLD_ZERO = "told zero: "
@@ -53,9 +54,9 @@ def run(
     """Test the claim; the run folder and the tables for the screen. work: where finished units are kept."""
     if publish is not None:
         check_place(publish)  # not after hours
+    run_of = RunRecord.of("experiments claim", command)
     found, failed = compute(config, stage, work)
-    with run_folder(runs, "claim") as folder:
-        save_config(config, folder / "config.toml")
+    with recorded_run(runs, "claim", run_of, config) as folder:
         tables = write_claim(folder, config, found, failed=failed, facts={"command": command}, stage=stage)
     if publish is not None:
         publish_results(finished_path(folder), found, publish)
@@ -66,9 +67,9 @@ def tune(
     config: TuneConfig, stage: Stage, *, runs: Path, work: Path, command: str = ""
 ) -> tuple[Path, list[ReportTable]]:
     """Try candidates on worlds that are not scored; the run folder and the table for the screen."""
+    run_of = RunRecord.of("experiments claim-tune", command)
     found, _ = compute(config, stage, work)
-    with run_folder(runs, "claim-tune") as folder:
-        save_config(config, folder / "config.toml")
+    with recorded_run(runs, "claim-tune", run_of, config) as folder:
         tables = write_tuning(folder, config, found, command=command)
     return finished_path(folder), tables
 
@@ -89,7 +90,7 @@ def compute(config: ClaimConfig, stage: Stage, work: Path) -> tuple[dict[Unit, l
     """
     kept = KeptScores(work / "units")
     scenes = open_scenes(config, stage, work)
-    code = code_key(CODE, but=NOT_CODE)
+    code = code_key(CODE, but=NO_SCORE_DEPENDS_ON)
     jobs = [Job(unit, task, key_of(code, scenes[unit.world].key, task)) for unit, task in tasks(config)]
     failed = make(jobs, scenes, kept, stage)
     # Read back even where they were made just now: what is kept is what counts.
@@ -133,15 +134,7 @@ def name_of(unit: Unit) -> str:
 
 def open_scenes(config: ClaimConfig, stage: Stage, work: Path) -> dict[str, Scene]:
     """The drive through each world, recorded unless it was, and its truth."""
-    folder, code = work / "drives", code_key(["sim"])
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = {}
-    for world in config.worlds:
-        drive = config.drive(world)
-        paths[world] = folder / f"{world}-{key_of(code, drive)[:12]}.mcap"
-        if not paths[world].exists():
-            half = folder / f".half-{paths[world].name}"
-            record(drive, half, stage).replace(paths[world])
+    paths = {world: kept_drive(config.drive(world), work / "drives", stage) for world in config.worlds}
     cell_m, range_m = config.mapping.grid.cell_m, config.mapping.model.max_range_m
     with stage("finding what the cameras could see", len(paths)) as step:
         jobs = {world: partial(Scene, path, cell_m=cell_m, range_m=range_m) for world, path in paths.items()}

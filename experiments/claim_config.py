@@ -1,17 +1,19 @@
 """What the claim is tested on: worlds, noises of the poses, and arms, all in one TOML file."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import Annotated
 
 from sim.faults import camera_faults
 from sim.rig import MINORU
 from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, config_from_table
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError, unknown_name
 from stereogrid.motion import WAYS, Growth, MotionError
 from stereogrid.sensor_model import SensorModel
+from stereogrid.tomlfile import merged
 
-from .drives import DriveConfig
+from .drives import CAMERA_FAULTS, DISTANCE, EVERY, DriveConfig
 
 SCORED, TUNING = ("corridor", "office", "entrance"), ("warehouse", "outdoor")
 NONE = "none"
@@ -22,16 +24,14 @@ SIZES = ("position_m", "heading_rad", "along", "across", "heading", "turn")
 
 @dataclass(frozen=True)
 class NoiseConfig:
-    """The error of the poses: of `error` only the sizes count.
+    """The error of the poses."""
 
-    believed: the noise whose error the mapper is told, "" for this one's own, as repeated runs would tell it.
-    most_seeds: so many of the config's at most, 0 = all.
-    """
-
-    name: str
-    error: MotionError = field(default_factory=MotionError)
-    believed: str = ""
-    most_seeds: int = 0
+    name: Annotated[str, Doc("What tables call it.")]
+    error: Annotated[MotionError, Doc("Of which only the sizes count.")] = field(default_factory=MotionError)
+    believed: Annotated[
+        str, Doc("The noise whose error the mapper is told; empty: this one's own, as repeated runs would tell it.")
+    ] = ""
+    most_seeds: Annotated[int, Doc("At most so many of the config's seeds; 0: all.", least=0)] = 0
 
 
 DRIFT = MotionError(along=Growth(2e-3, 0.02), across=Growth(5e-4))
@@ -46,16 +46,14 @@ NOISES = (
 
 @dataclass(frozen=True)
 class Arm:
-    """A way of mapping: what it sets in the common mapping, section by section.
+    """A way of mapping."""
 
-    fusions: the rules of fusion that it is mapped with, () = all. ray_seeds: with sum_of_rays so many of the config's
-    seeds at most, 0 = all.
-    """
-
-    name: str
-    mapping: dict = field(default_factory=dict)
-    fusions: tuple[str, ...] = ()
-    ray_seeds: int = 0
+    name: Annotated[str, Doc("What tables call it.")]
+    mapping: Annotated[dict, Doc("What it sets in the common mapping, section by section.")] = field(
+        default_factory=dict
+    )
+    fusions: Annotated[tuple[str, ...], Doc("The rules of fusion that it is mapped with; []: all.")] = ()
+    ray_seeds: Annotated[int, Doc("With sum_of_rays at most so many of the config's seeds; 0: all.", least=0)] = 0
 
 
 def arm_of(way: str) -> Arm:
@@ -65,43 +63,48 @@ def arm_of(way: str) -> Arm:
 
 @dataclass(frozen=True)
 class ClaimConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    worlds: a recorded drive each, of distance_m [m], 0 = all, with a pair every every_m [m]. kept_apart: worlds that
-    must not be among them: those that parameters were tuned on. n_seeds: the poses' noise is drawn with the seeds 1, 2,
-    ... n_seeds, and for the test of the bound, which takes no map, up to bound_seeds, if that is more; poses without
-    noise leave them the cameras' noise, which else is always drawn with camera_seed.
-    control_seeds: of the poses that a control shuffles, 0 for no controls. mapping: common to all arms, but for what
-    each sets; its error's sizes count for nothing. fusions: of the grid, each with every arm. reference: the arm that
-    the others are compared with. bound: whether the hits' claimed errors are tested. surface: whether the maps'
-    surfaces are scored.
-    """
-
-    worlds: tuple[str, ...] = SCORED
-    kept_apart: tuple[str, ...] = TUNING
-    n_seeds: int = 20
-    bound_seeds: int = 100
-    control_seeds: int = 3
-    world_seed: int = 0
-    every_m: float = 0.25
-    distance_m: float = 15.0
-    width_px: int = 320
-    height_px: int = 240
-    camera_faults: str = "mild"
-    camera_seed: int = 1
-    noises: tuple[NoiseConfig, ...] = NOISES
-    fusions: tuple[str, ...] = ("cell", "sum_of_rays")
-    arms: tuple[Arm, ...] = tuple(arm_of(way) for way in WAYS)
-    reference: str = NONE
-    mapping: MappingConfig = field(
+    worlds: Annotated[tuple[str, ...], Doc("A recorded drive each.")] = SCORED
+    kept_apart: Annotated[
+        tuple[str, ...], Doc("Worlds that must not be among them: those that parameters were tuned on.")
+    ] = TUNING
+    n_seeds: Annotated[
+        int,
+        Doc(
+            "The poses' noise is drawn with the seeds 1, 2, ... so many; where poses have none, the cameras' noise is.",
+            least=1,
+        ),
+    ] = 20
+    bound_seeds: Annotated[
+        int, Doc("The same for the test of the bound, which takes no map, if it is more.", least=0)
+    ] = 100
+    control_seeds: Annotated[int, Doc("Of the poses that a control shuffles; 0: no controls.", least=0)] = 3
+    world_seed: Annotated[int, Doc("Paints and furnishes the worlds.", least=0)] = 0
+    every_m: Annotated[float, EVERY] = 0.25
+    distance_m: Annotated[float, DISTANCE] = 15.0
+    width_px: Annotated[int, Doc("Width of the images.", "px", above=0)] = 320
+    height_px: Annotated[int, Doc("Height of the images.", "px", above=0)] = 240
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "mild"
+    camera_seed: Annotated[int, Doc("Draws the cameras' noise, where n_seeds does not.", least=0)] = 1
+    noises: Annotated[tuple[NoiseConfig, ...], Doc("The errors of the poses.")] = NOISES
+    fusions: Annotated[tuple[str, ...], Doc("Rules of fusion of the grid, each with every arm.")] = (
+        "cell",
+        "sum_of_rays",
+    )
+    arms: Annotated[tuple[Arm, ...], Doc("The ways of mapping that are compared.")] = tuple(arm_of(way) for way in WAYS)
+    reference: Annotated[str, Doc("The arm that the others are compared with.")] = NONE
+    mapping: Annotated[
+        MappingConfig, Doc("Common to all arms, but for what each sets; its error's sizes count for nothing.")
+    ] = field(
         default_factory=lambda: MappingConfig(
             matcher=MatcherConfig("bm", num_disparities=48),
             model=SensorModel(p_free=0.03, p_occupied=0.8, prior=0.3, max_range_m=4.0),
             grid=GridConfig(cell_m=0.1),
         )
     )
-    bound: bool = True
-    surface: bool = True
+    bound: Annotated[bool, Doc("Whether the hits' claimed errors are tested.")] = True
+    surface: Annotated[bool, Doc("Whether the maps' surfaces are scored.")] = True
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
@@ -112,9 +115,7 @@ class ClaimConfig:
         both = sorted({*self.worlds} & {*self.kept_apart})
         if both:
             raise InvalidInputError(f"{', '.join(both)}: a world is for tuning or for the claim, never for both")
-        for name in ("n_seeds", "bound_seeds", "control_seeds", "world_seed", "camera_seed"):
-            if getattr(self, name) < (name == "n_seeds"):
-                raise InvalidInputError(f"{name} must be {int(name == 'n_seeds')} or more, not {getattr(self, name)}")
+        check_fields(self)
         if self.reference not in self.by_arm:
             raise unknown_name("arm (reference)", self.reference, self.by_arm)
         if set(self.fusions_of(self.by_arm[self.reference])) < {*self.fusions}:
@@ -206,15 +207,6 @@ def telling(mapping: MappingConfig, error: MotionError) -> MappingConfig:
     """The mapping told of an error of this size; what it makes of it stays."""
     sizes = {name: getattr(error, name) for name in SIZES}
     return replace(mapping, motion_error=replace(mapping.motion_error, **sizes))
-
-
-def merged(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A nested table with changes to it."""
-    both = {**table}
-    for key, value in changes.items():
-        before = both.get(key)
-        both[key] = merged(before, value) if isinstance(before, Mapping) and isinstance(value, Mapping) else value
-    return both
 
 
 def _distinct(what: str, names: Iterable[str]) -> None:

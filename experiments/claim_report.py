@@ -11,6 +11,7 @@ from stereogrid.figures import save_figure
 from stereogrid.report import ReportFigure, ReportTable, write_report
 from stereogrid.scoring import BOUND_NAMES, Score
 from stereogrid.scoring.paired import Interval
+from stereogrid.tomlfile import CONFIG_TOML
 
 from .claim_bins import PREFIX
 from .claim_calibration import Calibrations, calibration_table, calibrations
@@ -93,6 +94,7 @@ def write_claim(
             facts=facts,
             meanings=MEANINGS,
             tables=tables,
+            config=config,
         )
     narrow = [overview_table(config, differences, short=True), calibration_table(config, calibrated, short=True)]
     return [*narrow, *([coverage_table(config, values, [THESE])] if config.bound else [])]
@@ -108,7 +110,7 @@ def write_tuning(folder: Path, config: ClaimConfig, found: Results, *, command: 
     write_table(folder / "candidates.csv", header, lines, digits=6)
     facts = {"command": command}
     title, summary = "Candidates for the claim", "On worlds that the claim is not scored on."
-    write_report(folder, title, summary=summary, arms={}, figures=[], facts=facts, tables=[table])
+    write_report(folder, title, summary=summary, arms={}, figures=[], facts=facts, tables=[table], config=config)
     return [table]
 
 
@@ -193,7 +195,7 @@ def publish_results(folder: Path, found: Results, place: Path) -> None:
     try:
         for picture in folder.glob("*.png"):
             shutil.copyfile(picture, place / picture.name)
-        for name in ("config.toml", CALIBRATION):
+        for name in (CONFIG_TOML, CALIBRATION):
             shutil.copyfile(folder / name, place / name)
     except OSError as error:
         raise InvalidInputError(f"{place}: nothing can be written there ({error.strerror})") from None

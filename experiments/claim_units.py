@@ -25,11 +25,6 @@ from .drives import OBSTACLES_M, open_drive, score_grid, true_disparity
 from .kept import file_key, key_of
 
 CODE = ("stereogrid", "sim/faults", "experiments/claim_units.py", "experiments/claim_bins.py", "experiments/drives.py")
-NOT_CODE = tuple(
-    f"stereogrid/{each}"
-    for each in ("cli.py", "motion_cli.py", "exporting", "figures", "report.py", "runs.py", "scoring/paired.py")
-)
-"""What no score depends on."""
 MAP, BOUND, TRUE_DEPTH, SHUFFLED, PRIOR = "map", "bound", "true depth", "shuffled poses", "prior only"
 CONTROLS, ANY = "controls", "any"
 """Where a noise, or a rule of fusion, stands else."""

@@ -3,9 +3,11 @@
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
-from stereogrid.config import config_from_table
+from stereogrid.config import MatcherConfig, config_from_table
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import ConfigError, InvalidInputError
 from stereogrid.matching import matcher
 from stereogrid.observation import Image, Matcher
@@ -17,24 +19,21 @@ SEE_COLOUR = ("gc", "kz2")
 
 @dataclass(frozen=True)
 class Contender:
-    """A matcher of stereogrid.matching as it takes part.
+    """A matcher of stereogrid.matching as it takes part."""
 
-    colour: whether pairs are shown to it in colour. labels_step: num_disparities is rounded up to a multiple of it;
-    0: it takes none. options: what else the matcher is made with.
-    """
-
-    matcher: str
-    colour: bool = False
-    labels_step: int = 1
-    options: dict = field(default_factory=dict)
+    matcher: Annotated[str, Doc("Its name.")]
+    colour: Annotated[bool, Doc("Whether pairs are shown to it in colour.")] = False
+    labels_step: Annotated[
+        int, Doc("num_disparities is rounded up to a multiple of it; 0: it takes none.", "px", least=0)
+    ] = 1
+    options: Annotated[dict, Doc("What else the matcher is made with.")] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.colour and self.matcher not in SEE_COLOUR:
             raise InvalidInputError(f"colour = true: of the matchers only {', '.join(SEE_COLOUR)} see colour")
         if "num_disparities" in self.options:
             raise InvalidInputError("options: num_disparities follows from the pair, by labels_step")
-        if self.labels_step < 0:
-            raise InvalidInputError(f"labels_step must be >= 0, not {self.labels_step}")
+        check_fields(self)
 
     def labels(self, wanted: int) -> int:
         """How many disparities it searches where `wanted` would do; 0 where it has no say in it."""
@@ -44,6 +43,11 @@ class Contender:
         """The matcher, which searches num_disparities or a few more."""
         labels = {"num_disparities": self.labels(num_disparities)} if self.labels_step else {}
         return matcher(self.matcher, **labels, **self.options)
+
+    def files(self) -> list[tuple[str, Path]]:
+        """What it reads from files, as RunRecord.reading takes it."""
+        network = self.options.get("network")
+        return MatcherConfig(self.matcher, network=str(network)).files() if network else []
 
     def images(self, pair: Pair) -> tuple[Image, Image]:
         """The pair as the contender sees it."""

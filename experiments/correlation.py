@@ -8,7 +8,7 @@ stands still, and what motion does to the error of a surface point on simulated 
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,10 @@ from stereogrid.files import written_beside
 from stereogrid.matching import MATCHERS
 from stereogrid.matching.correlation import ErrorReach, error_reaches
 from stereogrid.matching.sigma import GENERIC
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import write_metrics
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 
 from .correlation_figures import motion_figure, rho_figure
 from .correlation_length import Autocorrelation, autocorrelation, pooled
@@ -98,7 +100,8 @@ def run(
     for name in chosen:
         if name not in with_table:
             raise unknown_name("matcher with a table", name, with_table)
-    with run_folder(runs, "correlation") as folder:
+    run_of = RunRecord.of("experiments correlation", command).reading(("data", data))
+    with recorded_run(runs, "correlation", replace(run_of, matchers=tuple(names))) as folder:
         with stage("preparing scenes", 3) as step:
             prepared = []
             for make in (partial(static_pairs, data), partial(scenes, data), short_drives):

@@ -9,74 +9,88 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-
-import numpy as np
+from typing import Annotated
 
 from sim.faults import FaultyCameras, camera_faults
 from sim.rig import MINORU
-from sim.robot.wheel_faults import FaultyWheels, wheel_faults
-from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, save_config
+from sim.robot.wheel_faults import WHEEL_FAULTS, FaultyWheels, wheel_faults
+from stereogrid.config import GridConfig, MappingConfig, MatcherConfig
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError
 from stereogrid.mapping_run import Mapped, Track, build_map
 from stereogrid.motion import Growth, MotionError, NoisyOdometry, OdometryNoise
 from stereogrid.observation import Recording
+from stereogrid.recorded_run import recorded_run
 from stereogrid.recording import ShuffledPoses, TruePoses, TrueTilt
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.scoring.truth import MapTruth
 from stereogrid.sensor_model import SensorModel
 
 from .drive_report import IDEAL, KNOWN_TILT, NOISY, SHUFFLED, TRUE_DEPTH, Outcome, Story, write_results
-from .drives import OBSTACLES_M, DriveConfig, about, open_drive, record, score, true_disparity
+from .drives import (
+    CAMERA_FAULTS,
+    DISTANCE,
+    EVERY,
+    OBSTACLES,
+    OBSTACLES_M,
+    WORLD,
+    DriveConfig,
+    about,
+    open_drive,
+    record,
+    score,
+    true_disparity,
+)
 from .parallel import Stage, counted, in_parallel
 
 
 @dataclass(frozen=True)
 class DriveExperimentConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    seed makes the world, noise_seed draws the noise of cameras and odometry. every_m: distance between two
-    pairs [m]. distance_m: how much of the path is driven, 0 = all [m]. score_range_m: the visible set reaches so
-    far [m]. obstacles_m: the heights above the ground of the cells that are scored as obstacles [m]. people: so
-    many walk about. camera_faults: a text for sim.faults.camera_faults. wheel_faults: a preset of
-    sim.robot.wheel_faults, under odometry_noise. known_tilt: whether there is an arm that knows the true height,
-    roll and pitch. noisy_motion_error: eps of the noisy arms, in place of mapping's.
-    """
-
-    world: str = "corridor"
-    seed: int = 0
-    noise_seed: int = 1
-    every_m: float = 0.25
-    distance_m: float = 0.0
-    score_range_m: float = 5.0
-    obstacles_m: tuple[float, float] = OBSTACLES_M
-    people: int = 0
-    camera_faults: str = "mild"
-    wheel_faults: str = "none"
-    known_tilt: bool = False
-    odometry_noise: OdometryNoise = field(
+    world: Annotated[str, WORLD] = "corridor"
+    seed: Annotated[int, Doc("Paints and furnishes the world.", least=0)] = 0
+    noise_seed: Annotated[int, Doc("Draws the noise of cameras and odometry.", least=0)] = 1
+    every_m: Annotated[float, EVERY] = 0.25
+    distance_m: Annotated[float, DISTANCE] = 0.0
+    score_range_m: Annotated[float, Doc("Cells seen within this range are scored.", "m", above=0)] = 5.0
+    obstacles_m: Annotated[tuple[float, float], OBSTACLES] = OBSTACLES_M
+    people: Annotated[int, Doc("So many walk about.", least=0)] = 0
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "mild"
+    wheel_faults: Annotated[str, Doc("Of the robot, before odometry_noise is added.", choices=tuple(WHEEL_FAULTS))] = (
+        "none"
+    )
+    known_tilt: Annotated[bool, Doc("Whether there is an arm that knows the true height, roll and pitch.")] = False
+    width_px: Annotated[int, Doc("Width of the images; the cameras stay 42 degrees wide.", "px", above=0)] = (
+        MINORU.width_px
+    )
+    height_px: Annotated[int, Doc("Height of the images.", "px", above=0)] = MINORU.height_px
+    odometry_noise: Annotated[OdometryNoise, Doc("Noise of the noisy arms' odometry.")] = field(
         default_factory=lambda: OdometryNoise(
             rotation_per_rad=1e-4, rotation_per_m=1e-6, translation_per_m=1e-5, translation_per_rad=1e-5
         )
     )
-    mapping: MappingConfig = field(default_factory=lambda: bm_mapping(range_m=5.0, cell_m=0.05))
-    noisy_motion_error: MotionError = field(default_factory=lambda: MotionError(along=Growth(a=1e-5)))
+    mapping: Annotated[MappingConfig, Doc("How every arm maps.")] = field(
+        default_factory=lambda: bm_mapping(range_m=5.0, cell_m=0.05)
+    )
+    noisy_motion_error: Annotated[
+        MotionError, Doc("What the noisy arms are told of their poses' error, in place of mapping.motion_error.")
+    ] = field(default_factory=lambda: MotionError(along=Growth(a=1e-5)))
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
         wheel_faults(self.wheel_faults)
-        self.mapping.build_mapper(MINORU)
-        if not (np.isfinite(self.score_range_m) and self.score_range_m > 0):
-            raise InvalidInputError(f"score_range_m must be positive and finite, not {self.score_range_m}")
-        if not self.noise_seed >= 0:
-            raise InvalidInputError(f"noise_seed must be >= 0, not {self.noise_seed}")
+        self.mapping.build_mapper(self.drive.rig.camera)
+        check_fields(self, but=("world",))
         if len(self.obstacles_m) != 2 or not self.obstacles_m[0] < self.obstacles_m[1]:
             raise InvalidInputError(f"obstacles_m must be two heights, the lower first, not {self.obstacles_m}")
-        _ = self.drive
 
     @property
     def drive(self) -> DriveConfig:
         """The drive to be simulated."""
-        return DriveConfig(self.world, self.seed, self.every_m, self.distance_m, self.people)
+        size = {"width_px": self.width_px, "height_px": self.height_px}
+        return DriveConfig(self.world, self.seed, self.every_m, self.distance_m, self.people, **size)
 
 
 def bm_mapping(*, range_m: float, cell_m: float) -> MappingConfig:
@@ -99,13 +113,23 @@ def run_story(
 ) -> tuple[Path, dict[str, Outcome]]:
     """Record (or reuse) the drive, map it in every arm, score, draw, report; the run folder and the outcomes."""
     reused = open_drive(recording) if recording else None
-    with run_folder(runs, story.name) as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of(f"experiments {story.name}", command, recording, made="drive.mcap")
+    with recorded_run(runs, story.name, run_of.reading(*config.mapping.matcher.files()), config) as folder:
         drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         truth, outcomes = score_arms(drive, config, stage)
-        with stage("drawing", 5) as step:
+        with stage("drawing", 6) as step:
             facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
-            write_results(folder, story, drive, truth, outcomes, facts=facts, heights_m=config.obstacles_m, step=step)
+            write_results(
+                folder,
+                story,
+                drive,
+                truth,
+                outcomes,
+                facts=facts,
+                config=config,
+                heights_m=config.obstacles_m,
+                step=step,
+            )
     return finished_path(folder), outcomes
 
 
@@ -146,6 +170,6 @@ def score_arms(drive: Recording, config: DriveExperimentConfig, stage: Stage) ->
     truth: MapTruth = results.pop("truth")
     obstacles = truth.above_ground(*config.obstacles_m)
     with stage("scoring", len(results)) as step:
-        jobs = {name: partial(score, truth, obstacles, mapped) for name, mapped in results.items()}
+        jobs = {name: partial(score, truth, obstacles, mapped, intervals=True) for name, mapped in results.items()}
         scores = in_parallel(jobs, step)
     return truth, {name: Outcome(mapped, scores[name]) for name, mapped in results.items()}

@@ -4,15 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from stereogrid.figures import reliability_figure, save_figure
-from stereogrid.mapping_run import Mapped, draw_map
+from stereogrid.map_report import (
+    Drawn,
+    draw_all,
+    map_drawings,
+    reliability_drawing,
+    save_trajectory,
+    trajectory_drawing,
+)
+from stereogrid.map_truth import KnownTruth
+from stereogrid.mapping_run import Mapped
 from stereogrid.observation import Recording
-from stereogrid.report import ReportFigure, ReportTable, write_metrics, write_report
+from stereogrid.report import ReportTable, write_metrics, write_report
 from stereogrid.scoring import Score, scores_to_dict
+from stereogrid.scoring.meanings import OF_CELLS
 from stereogrid.scoring.score import DIMENSIONLESS
-from stereogrid.scoring.truth import MapTruth
+from stereogrid.scoring.truth import KnowsTruth, MapTruth
 
 from .drives import HEADLINE, obstacle_meanings
 from .parallel import Step, counted
@@ -50,38 +57,51 @@ def write_results(
     outcomes: Mapping[str, Outcome],
     *,
     facts: Mapping[str, str],
+    config: object = None,
     heights_m: Sequence[float],
     step: Step,
 ) -> None:
     """Maps, metrics, figures and the report of the run, into its folder."""
     for name, outcome in outcomes.items():
-        outcome.mapped.grid.save(folder / f"map-{name.replace(',', '').replace(' ', '-')}.sgrid")
-    write_metrics(folder, {"facts": facts, "arms": {n: scores_to_dict(o.scores) for n, o in outcomes.items()}})
+        outcome.mapped.grid.save(folder / f"map-{_slug(name)}.sgrid")
+        save_trajectory(outcome.mapped, folder / f"trajectory-{_slug(name)}.tum")
+    notes = [OF_CELLS, truth.interval_note]
+    metrics = {"facts": facts, "notes": notes, "arms": {n: scores_to_dict(o.scores) for n, o in outcomes.items()}}
+    write_metrics(folder, metrics)
+    drawn = draw(folder, drive, truth, outcomes, step=step)
     write_report(
         folder,
         story.title,
         summary=story.summary,
         arms={name: outcome.scores for name, outcome in outcomes.items()},
-        figures=draw(folder, drive, truth, outcomes, step=step),
-        facts=facts,
+        figures=drawn.figures,
+        facts={**facts, **{f"map sha256, {n}": o.mapped.grid.sha256() for n, o in outcomes.items()}},
         headline=HEADLINE,
         meanings=obstacle_meanings(heights_m),
+        notes=[*notes, *drawn.left_out],
+        config=config,
     )
 
 
-def draw(
-    folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome], *, step: Step
-) -> list[ReportFigure]:
-    """The figures of the main arm, and its reliability beside the noisy one's; step after each of the five."""
-    main = outcomes[IDEAL].mapped
-    section_m = truth.section_m(float(np.median(main.path_m[:, 2])))
-    figures = draw_map(main, drive, folder, counted(step), truth_segments_m=section_m)
-    for name in (IDEAL, NOISY):
-        figure = reliability_figure(truth.reliability(outcomes[name].mapped.grid), title=f"Reliability, {name}")
-        path = save_figure(figure, folder / f"reliability-{name}.png")
-        figures.append(ReportFigure(path, f"Are the probabilities of the {name} arm frequencies?"))
-        step()
-    return figures
+def draw(folder: Path, drive: Recording, truth: MapTruth, outcomes: Mapping[str, Outcome], *, step: Step) -> Drawn:
+    """The figures of the main arm, the noisy one's way, and both their reliabilities; step after each."""
+    poses = drive.true_poses() if isinstance(drive, KnowsTruth) else None
+    known = KnownTruth(truth, poses=poses)
+    disparity, section, cubes, *_ = map_drawings(outcomes[IDEAL].mapped, drive, KnownTruth(truth))
+    noisy = outcomes[NOISY].mapped
+    drawings = [
+        disparity,
+        section,
+        cubes,
+        trajectory_drawing(noisy.path_m, known.path_m(len(noisy.path_m)), f"{NOISY} arm"),
+        *(reliability_drawing(f"reliability-{n}", outcomes[n].mapped, truth, f"{n} arm") for n in (IDEAL, NOISY)),
+    ]
+    return draw_all(drawings, folder, counted(step))
+
+
+def _slug(name: str) -> str:
+    """An arm's name in the name of a file."""
+    return name.replace(",", "").replace(" ", "-")
 
 
 def headline_table(outcomes: Mapping[str, Outcome]) -> ReportTable:

@@ -4,16 +4,19 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
+from sim.faults import PRESETS
 from sim.record import record_drive
 from sim.rendering.renderers import RASTER
 from sim.rig import MINORU, StereoRig, webcam
 from sim.robot.pioneer import SimulationError
-from sim.worlds.world import WorldPlan
+from sim.worlds.world import WORLDS, WorldPlan
 from stereogrid.camera import StereoCamera
-from stereogrid.errors import InvalidInputError, RecordingError
+from stereogrid.described import Doc, check_fields
+from stereogrid.errors import RecordingError
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Mapped
 from stereogrid.observation import Disparity, Observation, Recording
@@ -44,6 +47,16 @@ TRUE_SIGMA_PX = 0.05
 OBSTACLES_M = (0.15, 2.4)
 """Heights between the floor and the ceiling of the corridor [m]."""
 OBSTACLE_SCORES = ("auc", "occupied_precision", "occupied_recall", "occupied_f1")
+# Words of parameters that several experiments have.
+WORLD = Doc("The world that is driven through.", choices=tuple(WORLDS))
+WIDTH = Doc("Width of the images; the cameras stay 42 degrees wide.", "px", above=0)
+HEIGHT = Doc("Height of the images.", "px", above=0)
+EVERY = Doc("Distance between two pairs.", "m", above=0)
+DISTANCE = Doc("How much of the path is driven; 0: all.", "m", least=0)
+OBSTACLES = Doc("Heights above the ground of the cells that are scored as obstacles, the lower first.", "m")
+CAMERA_FAULTS = Doc(f"A preset, with changes to it as docs/simulator.md has them: {', '.join(PRESETS)}.")
+N_SEEDS = Doc("Noise is drawn with the seeds 1, 2, ... so many.", above=0)
+NUM_DISPARITIES = Doc("Disparities searched on the drive.", "px", above=0)
 
 
 def obstacle_meanings(heights_m: Sequence[float]) -> dict[str, str]:
@@ -59,28 +72,20 @@ OBSTACLE_MEANINGS = obstacle_meanings(OBSTACLES_M)
 
 @dataclass(frozen=True)
 class DriveConfig:
-    """A simulated drive. seed paints the world, in which so many people walk.
+    """A simulated drive; the cameras are 42 degrees wide, whatever their images' size."""
 
-    every_m: distance between two pairs [m]. distance_m: how much of the path is driven, 0 = all [m]. width_px,
-    height_px: of the images; the cameras stay 42 degrees wide.
-    """
-
-    world: str = "corridor"
-    seed: int = 0
-    every_m: float = 0.25
-    distance_m: float = 0.0
-    people: int = 0
-    width_px: int = MINORU.width_px
-    height_px: int = MINORU.height_px
+    world: Annotated[str, WORLD] = "corridor"
+    seed: Annotated[int, Doc("Paints and furnishes the world.", least=0)] = 0
+    every_m: Annotated[float, EVERY] = 0.25
+    distance_m: Annotated[float, DISTANCE] = 0.0
+    people: Annotated[int, Doc("So many walk about.", least=0)] = 0
+    width_px: Annotated[int, WIDTH] = MINORU.width_px
+    height_px: Annotated[int, HEIGHT] = MINORU.height_px
 
     def __post_init__(self) -> None:
         WorldPlan(self.world, self.seed, self.people)
         _ = self.rig
-        if not (np.isfinite(self.every_m) and self.every_m > 0):
-            raise InvalidInputError(f"every_m must be positive and finite, not {self.every_m}")
-        for name in ("seed", "distance_m"):
-            if not getattr(self, name) >= 0:
-                raise InvalidInputError(f"{name} must be >= 0, not {getattr(self, name)}")
+        check_fields(self)
 
     @property
     def rig(self) -> StereoRig:
@@ -132,16 +137,18 @@ def true_disparity(camera: StereoCamera, observation: Observation) -> Disparity:
     return Disparity(disparity_px, np.full_like(disparity_px, TRUE_SIGMA_PX))
 
 
-def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped) -> list[Score]:
+def score(truth: MapTruth, obstacles: MapTruth, mapped: Mapped, *, intervals: bool = False) -> list[Score]:
     """Every score of a map, and those of the obstacles alone: floor and ceiling are easy, and half of the cells."""
-    return score_grid(truth, obstacles, mapped.grid)
+    return score_grid(truth, obstacles, mapped.grid, intervals=intervals)
 
 
-def score_grid(truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid, *, surface: bool = True) -> list[Score]:
+def score_grid(
+    truth: MapTruth, obstacles: MapTruth, grid: OccupancyGrid, *, surface: bool = True, intervals: bool = False
+) -> list[Score]:
     """The same of a grid; without those of the surface, which take the most time, where surface is False."""
-    among = obstacles.score(grid, prior=grid.model.prior, surface=False)
+    among = obstacles.score(grid, prior=grid.model.prior, surface=False, intervals=intervals)
     named = (replace(each, name=f"obstacle_{each.name}") for each in among if each.name in OBSTACLE_SCORES)
-    return [*truth.score(grid, prior=grid.model.prior, surface=surface), *named]
+    return [*truth.score(grid, prior=grid.model.prior, surface=surface, intervals=intervals), *named]
 
 
 def about(drive: Recording) -> dict[str, str]:

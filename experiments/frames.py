@@ -7,12 +7,12 @@ are the frames of a drive of any length.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from stereogrid.camera import StereoCamera
-from stereogrid.errors import InvalidInputError
+from stereogrid.described import Doc, check_fields
 from stereogrid.geometry import R_BASE_OPTICAL, FloatArray, as_floats, from_rotation, from_yaw
 from stereogrid.observation import Disparity, FloatImage
 from stereogrid.scoring import label_cells, visible_cells
@@ -41,29 +41,20 @@ INDEPENDENT = {"correlation_px": 1.0} if "correlation_px" in {field.name for fie
 
 @dataclass(frozen=True)
 class FramesConfig:
-    """What is seen, and how well.
+    """What is seen, and how well."""
 
-    width_px: of the images, 3 / 4 of it high. n: poses, spacing_m apart [m]. range_m: depths beyond it are missing [m].
-    sigma_px: the noise [px]. seed: of furniture and noise. aligned: walls and furniture on borders of cells of 5 and
-    10 cm, instead of 1.4 cm off them.
-    """
-
-    width_px: int = 320
-    n: int = 100
-    spacing_m: float = 0.3
-    range_m: float = 8.0
-    sigma_px: float = 0.25
-    seed: int = 0
-    aligned: bool = False
+    width_px: Annotated[int, Doc("Width of the images; 3 / 4 of it high.", "px", above=0)] = 320
+    n: Annotated[int, Doc("So many poses.", above=0)] = 100
+    spacing_m: Annotated[float, Doc("From pose to pose.", "m", above=0)] = 0.3
+    range_m: Annotated[float, Doc("Depths beyond it are missing.", "m", above=0, below=BEYOND_M)] = 8.0
+    sigma_px: Annotated[float, Doc("Noise of the disparities: standard deviation.", "px", above=0)] = 0.25
+    seed: Annotated[int, Doc("Of furniture and noise.", least=0)] = 0
+    aligned: Annotated[
+        bool, Doc("Walls and furniture on borders of cells of 5 and 10 cm, instead of 1.4 cm off them.")
+    ] = False
 
     def __post_init__(self) -> None:
-        for name in ("width_px", "n", "spacing_m", "range_m", "sigma_px"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise InvalidInputError(f"{name} must be positive and finite, not {getattr(self, name)}")
-        if self.seed < 0:
-            raise InvalidInputError(f"seed must be >= 0, not {self.seed}")
-        if self.range_m >= BEYOND_M:
-            raise InvalidInputError(f"range_m must be below {BEYOND_M:g}, not {self.range_m}")
+        check_fields(self)
 
     @property
     def camera(self) -> StereoCamera:

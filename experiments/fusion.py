@@ -6,20 +6,24 @@ Everything else is the same in every arm, pair by pair: poses, images, noise, an
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 from sim.faults import camera_faults
 from sim.rig import MINORU
-from stereogrid.config import GridConfig, MappingConfig, save_config
+from stereogrid.config import GridConfig, MappingConfig
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError, unknown_name
 from stereogrid.matching import MATCHERS, matcher
 from stereogrid.observation import Recording
+from stereogrid.recorded_run import recorded_run
 from stereogrid.recording import open_recording
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.sensor_model import SensorModel
 
 from .compared import Compared
-from .drives import DriveConfig, about, open_drive, record
+from .drives import CAMERA_FAULTS, N_SEEDS, NUM_DISPARITIES, DriveConfig, about, open_drive, record
 from .frames import FramesConfig
 from .fusion_drive import Drive, compare_on_drive, compare_on_frames
 from .fusion_report import CLAMPS, REAL, SIMULATED, Worlds, write_results
@@ -31,35 +35,40 @@ from .parallel import Stage
 
 @dataclass(frozen=True)
 class FusionConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    matchers: seen on the drive; kz2 takes 18 s a pair. n_seeds: image noise is drawn with the seeds 1, 2, ... n_seeds.
-    camera_faults: see sim.faults.camera_faults. num_disparities: searched on the drive. clamps_of: the matcher whose
-    maps show what clamps do, "" for none. frame_seeds: worlds of frames with independent noise, 0 for none.
-    frame_cells_m: the cells that these are mapped with [m]. street, room: the real sequences, where there are any.
-    """
-
-    matchers: tuple[str, ...] = ("bm", "sgbm", "gc")
-    n_seeds: int = 5
-    camera_faults: str = "mild"
-    num_disparities: int = 80
-    clamps_of: str = "bm"
-    drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
-    model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
-    grid: GridConfig = field(default_factory=lambda: GridConfig(cell_m=0.05))
-    frames: FramesConfig = field(default_factory=lambda: FramesConfig(n=100))
-    frame_seeds: int = 3
-    frame_cells_m: tuple[float, ...] = (0.05, 0.1)
-    street: StreetConfig = field(default_factory=StreetConfig)
-    room: RoomConfig = field(default_factory=RoomConfig)
+    matchers: Annotated[tuple[str, ...], Doc("Seen on the drive; kz2 takes 18 s a pair.")] = ("bm", "sgbm", "gc")
+    n_seeds: Annotated[int, N_SEEDS] = 5
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "mild"
+    num_disparities: Annotated[int, NUM_DISPARITIES] = 80
+    clamps_of: Annotated[str, Doc("The matcher whose maps show what clamps do; empty: none.")] = "bm"
+    drive: Annotated[DriveConfig, Doc("The drive that is mapped.")] = field(
+        default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0)
+    )
+    model: Annotated[SensorModel, Doc("Of the maps of the drive.")] = field(
+        default_factory=lambda: SensorModel(max_range_m=5.0)
+    )
+    grid: Annotated[GridConfig, Doc("Of the maps of the drive.")] = field(
+        default_factory=lambda: GridConfig(cell_m=0.05)
+    )
+    frames: Annotated[FramesConfig, Doc("Frames whose noise is independent from pixel to pixel.")] = field(
+        default_factory=lambda: FramesConfig(n=100)
+    )
+    frame_seeds: Annotated[int, Doc("So many worlds of such frames; 0: none.", least=0)] = 3
+    frame_cells_m: Annotated[tuple[float, ...], Doc("The cells that these are mapped with.", "m", above=0)] = (
+        0.05,
+        0.1,
+    )
+    street: Annotated[StreetConfig, Doc("A real street, where there is one: every other pair is held out.")] = field(
+        default_factory=StreetConfig
+    )
+    room: Annotated[
+        RoomConfig, Doc("A real room, where there is one: measured depths as the disparities of a virtual rig.")
+    ] = field(default_factory=RoomConfig)
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
-        for name in ("n_seeds", "num_disparities"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
-        if self.frame_seeds < 0:
-            raise InvalidInputError(f"frame_seeds must be >= 0, not {self.frame_seeds}")
+        check_fields(self)
         if not self.matchers:
             raise InvalidInputError(f"matchers names none; choose from: {', '.join(sorted(MATCHERS))}")
         for name in self.matchers:
@@ -91,8 +100,8 @@ def run(
     if data is not None and not data.is_dir():
         raise InvalidInputError(f"{data}: no such folder of data")
     reused = open_drive(recording) if recording else None
-    with run_folder(runs, "fusion") as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of("experiments fusion", command, recording, made="drive.mcap").reading(("data", data))
+    with recorded_run(runs, "fusion", run_of, config) as folder:
         drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         real, skipped = compare_real(data, config, stage)  # first: damaged data are refused early
         on_drive = compare_drive(drive, config, stage)
@@ -103,7 +112,7 @@ def run(
         }
         facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
         with stage("drawing", 1):
-            tables = write_results(folder, worlds, skipped=skipped, facts=facts)
+            tables = write_results(folder, worlds, skipped=skipped, facts=facts, config=config)
     return finished_path(folder), tables
 
 

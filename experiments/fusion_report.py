@@ -40,7 +40,7 @@ Worlds = Mapping[str, Sequence[Compared]]
 
 
 def write_results(
-    folder: Path, worlds: Worlds, *, skipped: Sequence[str], facts: Mapping[str, str]
+    folder: Path, worlds: Worlds, *, skipped: Sequence[str], facts: Mapping[str, str], config: object = None
 ) -> list[ReportTable]:
     """Numbers, figures, results.md and the report of the run; the tables for the screen."""
     every = [world for kind in worlds.values() for world in kind]
@@ -56,6 +56,7 @@ def write_results(
         facts=facts,
         meanings={**OBSTACLE_MEANINGS, **{name: meaning for name, (_, meaning) in HELD_OUT_NAMES.items()}},
         tables=tables,
+        config=config,
     )
     write_markdown(folder / "results.md", tables, skipped, facts)
     return means

@@ -5,55 +5,50 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Event
+from typing import Annotated
 
-import cv2
 import numpy as np
 
 from stereogrid.camera import StereoCamera
 from stereogrid.config import GridConfig
-from stereogrid.errors import InvalidInputError, RecordingError
-from stereogrid.geometry import FloatArray, from_rotation
+from stereogrid.described import Doc, check_fields
+from stereogrid.errors import RecordingError
+from stereogrid.geometry import FloatArray
 from stereogrid.mapping_run import Track
 from stereogrid.observation import Disparity
+from stereogrid.recording.rgbd_files import read_depth_m, read_pose_file
+from stereogrid.recording.rgbd_frames import PATTERN, PER_M
+from stereogrid.recording.virtual_rig import measured_disparity, with_noise
 from stereogrid.scoring import Score
 from stereogrid.scoring.held_out import HELD_OUT_NAMES, HeldOutRays, held_out_scores
 from stereogrid.sensor_model import SensorModel
 
 from .compared import Compared
+from .drives import N_SEEDS
 from .fusion_arms import FIRST, OF_INDEPENDENT, Reading, fused
 from .parallel import Stage, counted, in_parallel, until
 
 ROOM = Path("sequences") / "rgbd_7scenes"
 FOCAL_PX, CENTRE_PX, SIZE_PX = 585.0, (320.0, 240.0), (640, 480)
 """Of the depth camera."""
-KINECT_SIGMA_PX = 0.05
-"""Of the measured depths, as disparities of a rig with a baseline of 6 cm: a Kinect errs by about 1.4 mm at 1 m and by
-the square of the depth farther off (Khoshelham and Elberink, Sensors 12, 2012)."""
-ROUNDING = 0.01
-"""Of the numbers in the files of poses, at most."""
 NEAREST_M = 0.5
 """A Kinect sees nothing nearer."""
 
 
 @dataclass(frozen=True)
 class RoomConfig:
-    """The room: measured depths become disparities of a virtual rig with noise that is independent from pixel to pixel.
+    """The room: measured depths become disparities of a virtual rig with noise independent from pixel to pixel."""
 
-    every: of the frames, one in so many is used. n_seeds: of the noise. rays: drawn from each held-out frame.
-    """
-
-    baseline_m: float = 0.06
-    sigma_px: float = 0.25
-    cell_m: float = 0.05
-    max_range_m: float = 4.0
-    every: int = 2
-    n_seeds: int = 3
-    rays: int = 1000
+    baseline_m: Annotated[float, Doc("Of the virtual rig.", "m", above=0)] = 0.06
+    sigma_px: Annotated[float, Doc("Noise of the disparities: standard deviation.", "px", above=0)] = 0.25
+    cell_m: Annotated[float, Doc("Edge of a cell.", "m", above=0)] = 0.05
+    max_range_m: Annotated[float, Doc("Depths beyond it are not used.", "m", above=0)] = 4.0
+    every: Annotated[int, Doc("Of the frames, one in so many is used.", above=0)] = 2
+    n_seeds: Annotated[int, N_SEEDS] = 3
+    rays: Annotated[int, Doc("Drawn from each held-out frame.", above=0)] = 1000
 
     def __post_init__(self) -> None:
-        for name in ("baseline_m", "sigma_px", "every", "n_seeds", "rays"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
+        check_fields(self)
 
     @property
     def camera(self) -> StereoCamera:
@@ -70,26 +65,10 @@ class DepthFrame:
 
 
 def read_depths(folder: Path) -> Iterator[DepthFrame]:
-    """The frames of a folder of *.depth.png [mm] with their *.pose.txt, by name. RecordingError when one is wrong."""
-    for path in sorted(folder.glob("*.depth.png")):
-        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    """The frames of a folder of frame-*.depth.png [mm] and their poses, by name. RecordingError when one is wrong."""
+    for path in sorted(folder.glob(PATTERN)):
         pose_path = path.with_name(path.name.replace(".depth.png", ".pose.txt"))
-        try:
-            T_world_cam = np.loadtxt(pose_path).reshape(4, 4)
-        except (OSError, ValueError) as error:
-            raise RecordingError(f"{pose_path}: missing, or not the 16 numbers of a pose") from error
-        if image is None or image.dtype != np.uint16 or image.ndim != 2:
-            raise RecordingError(f"{path}: not a depth image of 16 bits")
-        yield DepthFrame(np.where(image > 0, image / 1000, np.nan), nearly_rigid(T_world_cam, pose_path))
-
-
-def nearly_rigid(T: FloatArray, path: Path) -> FloatArray:
-    """The pose (4, 4) with the rotation nearest to its own, as rounded files need it; RecordingError if that is far."""
-    u, _, vt = np.linalg.svd(T[:3, :3]) if np.isfinite(T).all() else (np.zeros((3, 3)), None, np.zeros((3, 3)))
-    rotation = u @ vt
-    if np.abs(rotation - T[:3, :3]).max(initial=0) > ROUNDING or not np.linalg.det(rotation) > 0:
-        raise RecordingError(f"{path}: no rotation and position")
-    return from_rotation(rotation, T[:3, 3])
+        yield DepthFrame(read_depth_m(path, SIZE_PX[::-1], PER_M), read_pose_file(pose_path))
 
 
 def compare_in_room(folder: Path, config: RoomConfig, stage: Stage) -> Compared:
@@ -113,7 +92,7 @@ def compare_in_room(folder: Path, config: RoomConfig, stage: Stage) -> Compared:
 
 
 def _rays(frame: DepthFrame, config: RoomConfig, rng: np.random.Generator) -> HeldOutRays:
-    measured = Disparity(config.camera.disparity_px(frame.depth_m), KINECT_SIGMA_PX)
+    measured = measured_disparity(config.camera, frame.depth_m)
     reach_m = config.max_range_m
     return HeldOutRays.of_disparity(
         config.camera, measured, frame.T_world_cam, n=config.rays, max_range_m=reach_m, rng=rng
@@ -135,7 +114,5 @@ def _scored(
 
 def noisy(config: RoomConfig, frame: DepthFrame, rng: np.random.Generator) -> Reading:
     """What the virtual rig would read: noise of config.sigma_px that is independent, and said to be so."""
-    noise_px = rng.normal(0, config.sigma_px, frame.depth_m.shape)
-    disparity_px = config.camera.disparity_px(frame.depth_m) + noise_px
-    disparity_px[~(disparity_px > 0)] = np.nan
+    disparity_px = with_noise(config.camera.disparity_px(frame.depth_m), config.sigma_px, rng)
     return Reading(Disparity(disparity_px, config.sigma_px, correlation_px=1.0), frame.T_world_cam)

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Event
+from typing import Annotated
 
 import numpy as np
 
 from stereogrid.camera import StereoCamera
 from stereogrid.config import GridConfig
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.mapping_run import Track
 from stereogrid.matching import matcher
@@ -32,22 +34,17 @@ SURE_CELLS = 1.5
 
 @dataclass(frozen=True)
 class StreetConfig:
-    """The street: every other pair is mapped, the others are held out. most_pairs: of both, 0 = all.
+    """The street: every other pair is mapped, the others are held out."""
 
-    rays: drawn from each held-out pair.
-    """
-
-    matchers: tuple[str, ...] = ("bm", "sgbm")
-    num_disparities: int = 128
-    cell_m: float = 0.2
-    max_range_m: float = 15.0
-    rays: int = 1000
-    most_pairs: int = 0
+    matchers: Annotated[tuple[str, ...], Doc("Seen on the street.")] = ("bm", "sgbm")
+    num_disparities: Annotated[int, Doc("Disparities searched.", "px", above=0)] = 128
+    cell_m: Annotated[float, Doc("Edge of a cell.", "m", above=0)] = 0.2
+    max_range_m: Annotated[float, Doc("Depths beyond it are not used.", "m", above=0)] = 15.0
+    rays: Annotated[int, Doc("Drawn from each held-out pair.", above=0)] = 1000
+    most_pairs: Annotated[int, Doc("At most so many pairs, mapped and held out; 0: all.", least=0)] = 0
 
     def __post_init__(self) -> None:
-        for name in ("num_disparities", "rays"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
+        check_fields(self, but=("most_pairs",))
         if not self.matchers or self.most_pairs < 0 or self.most_pairs == 1:
             raise InvalidInputError("the street needs a matcher, and two pairs or more (0: all)")
         for name in self.matchers:

@@ -14,8 +14,10 @@ from typing import Any, TypeVar
 
 from stereogrid.errors import RecordingError
 from stereogrid.figures import save_figure
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable, environment
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 
 from .grid_bench_figure import bench_figure
 from .tidy import write_rows
@@ -109,7 +111,7 @@ def run(path: Path, *, runs: Path, picture: Path | None = None) -> tuple[Path, l
     """Lay out a benchmark's JSON in a new run folder; the folder and its tables. picture: the figure there as well."""
     rows = read_rows(path)
     tables = bench_tables(rows)
-    with run_folder(runs, "bench") as folder:
+    with recorded_run(runs, "bench", RunRecord.of("experiments grid-bench")) as folder:
         shutil.copyfile(path, folder / "bench.json")
         write_rows(folder / "bench.csv", [plain(row) for row in rows])
         text = "\n".join([_measured(json.loads(path.read_text(encoding="utf-8"))), *(t.markdown for t in tables)])

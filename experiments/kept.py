@@ -15,6 +15,15 @@ from stereogrid.files import written_beside
 from stereogrid.scoring import Score, scores_from_dict, scores_to_dict
 
 ROOT = Path(__file__).parents[1]
+NO_SCORE_DEPENDS_ON = tuple(
+    f"stereogrid/{each}"
+    for each in (
+        *("__main__.py", "cli.py", "commands", "screen.py", "checks.py", "doctor.py", "documented.py", "early.py"),
+        *("exporting", "figures", "report", "map_report.py", "map_truth.py", "thumbnails.py", "viewer", "runs.py"),
+        *("recorded_run.py", "run_record.py", "digests.py", "scoring/paired.py"),
+    )
+)
+"""What of the library only shows, writes and tells."""
 
 
 def key_of(*makings: object) -> str:
@@ -50,11 +59,7 @@ class KeptScores:
     """A folder with a file of scores for each key; a file is there whole or not at all."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InvalidInputError(f"{folder}: nothing can be kept there ({error.strerror})") from None
+        self.folder = _made(folder)
 
     def get(self, key: str) -> list[Score] | None:
         """The scores of that key; None where there are none, or where their file is damaged."""
@@ -71,3 +76,37 @@ class KeptScores:
 
     def _path(self, key: str) -> Path:
         return self.folder / f"{key}.json"
+
+
+class KeptTexts:
+    """A folder with a text for each key: why results could not be made."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = _made(folder)
+
+    def get(self, key: str) -> str | None:
+        """The text of that key; None where there is none."""
+        try:
+            return self._path(key).read_text(encoding="utf-8")
+        except (OSError, ValueError):
+            return None
+
+    def keep(self, key: str, text: str) -> None:
+        """Keep a text."""
+        with written_beside(self._path(key)) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+    def drop(self, key: str) -> None:
+        """Forget that key's, if there is one."""
+        self._path(key).unlink(missing_ok=True)
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.txt"
+
+
+def _made(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{folder}: nothing can be kept there ({error.strerror})") from None
+    return folder

@@ -8,17 +8,21 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 from sim.faults import camera_faults
 from sim.rig import MINORU
-from stereogrid.config import GridConfig, MappingConfig, save_config
-from stereogrid.errors import InvalidInputError, unknown_name
+from stereogrid.config import GridConfig, MappingConfig
+from stereogrid.described import Doc, check_fields
+from stereogrid.errors import unknown_name
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.sensor_model import SensorModel
 
 from .contenders import Contender, default_table, read_contenders
-from .drives import DriveConfig, about, open_drive, record
+from .drives import CAMERA_FAULTS, N_SEEDS, NUM_DISPARITIES, DriveConfig, about, open_drive, record
 from .matched_maps import Seeing, map_drive, truth_of
 from .matched_pairs import PairResult, at_most, match_pairs
 from .matchers_report import write_results
@@ -28,28 +32,30 @@ from .parallel import Stage
 
 @dataclass(frozen=True)
 class MatchersConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    reference: the contender that the others are compared with. most_pixels: larger pairs are shrunk. n_seeds: image
-    noise is drawn with the seeds 1, 2, ... n_seeds. camera_faults: see sim.faults.camera_faults. num_disparities:
-    searched on the drive. contenders: sections as contenders.Contender has them, by name.
-    """
-
-    reference: str = "bm"
-    most_pixels: int = 400_000
-    n_seeds: int = 5
-    camera_faults: str = "mild"
-    num_disparities: int = 80
-    drive: DriveConfig = field(default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0))
-    model: SensorModel = field(default_factory=lambda: SensorModel(max_range_m=5.0))
-    grid: GridConfig = field(default_factory=lambda: GridConfig(cell_m=0.05))
-    contenders: dict = field(default_factory=default_table)
+    reference: Annotated[str, Doc("The contender that the others are compared with.")] = "bm"
+    most_pixels: Annotated[int, Doc("Larger pairs are shrunk.", "pixels", above=0)] = 400_000
+    n_seeds: Annotated[int, N_SEEDS] = 5
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "mild"
+    num_disparities: Annotated[int, NUM_DISPARITIES] = 80
+    drive: Annotated[DriveConfig, Doc("The drive that each maps.")] = field(
+        default_factory=lambda: DriveConfig(every_m=0.5, distance_m=6.0)
+    )
+    model: Annotated[SensorModel, Doc("Of every map.")] = field(default_factory=lambda: SensorModel(max_range_m=5.0))
+    grid: Annotated[GridConfig, Doc("Of every map.")] = field(default_factory=lambda: GridConfig(cell_m=0.05))
+    contenders: Annotated[
+        dict,
+        Doc(
+            "A section for each matcher that takes part: matcher, its name; colour, whether it sees pairs in colour; "
+            "labels_step, num_disparities is rounded up to a multiple of it [px], 0: it takes none; options, what else "
+            "it is made with."
+        ),
+    ] = field(default_factory=default_table)
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
-        for name in ("most_pixels", "n_seeds", "num_disparities"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} must be positive, not {getattr(self, name)}")
+        check_fields(self)
         if self.reference not in self.contenders:
             raise unknown_name("contender", self.reference, self.contenders)
         for contender in self.contending.values():
@@ -84,15 +90,16 @@ def run(
     place = pairs or default_pairs()
     known = [at_most(pair, config.most_pixels) for pair in open_pairs(place)] if place else []
     reused = open_drive(recording) if recording else None
-    with run_folder(runs, "matchers") as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of("experiments matchers", command, recording, made="drive.mcap")
+    files = [each for contender in config.contending.values() for each in contender.files()]
+    with recorded_run(runs, "matchers", run_of.reading(("pairs", place), *files), config) as folder:
         drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         truth = truth_of(drive, config.seeing, stage)  # first: a drive without a truth is refused at once
         on_pairs = compare_on_pairs(known, config, stage)
         by_map = map_drive(drive, truth, config.contending, seeing=config.seeing, stage=stage)
         facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
         with stage("drawing", 1):
-            tables = write_results(folder, on_pairs, by_map, config.reference, facts=facts)
+            tables = write_results(folder, on_pairs, by_map, config.reference, facts=facts, config=config)
     return finished_path(folder), tables
 
 

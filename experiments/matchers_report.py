@@ -29,7 +29,13 @@ MEANINGS = {**OBSTACLE_MEANINGS, DENSITY: "share of the pixels that were matched
 
 
 def write_results(
-    folder: Path, on_pairs: Sequence[PairResult], by_map: MapResult, reference: str, *, facts: Mapping[str, str]
+    folder: Path,
+    on_pairs: Sequence[PairResult],
+    by_map: MapResult,
+    reference: str,
+    *,
+    facts: Mapping[str, str],
+    config: object = None,
 ) -> list[ReportTable]:
     """Maps, disparities, numbers, figures, results.md and the report of the run; the tables for the screen."""
     write_arrays(folder, on_pairs, by_map)
@@ -47,6 +53,7 @@ def write_results(
         facts=facts,
         meanings=MEANINGS,
         tables=tables,
+        config=config,
     )
     short = [*([short_pair_table(on_pairs)] if on_pairs else []), *of_maps]
     write_markdown(folder / "results.md", short, facts)

@@ -8,17 +8,20 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import cycle, islice
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from sim.robot.ground import SURFACES, find_surface
 from sim.robot.wheel_faults import wheel_faults
-from stereogrid.config import save_config
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError
 from stereogrid.motion import FitOptions, Growth, MotionError, Runs, fit_motion
 from stereogrid.motion.fit import BOOTSTRAPS, FEWEST
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 
 from .motion_course import WAYS, Course, bumpy, drive, faulty_runs, noisy_runs
 from .motion_report import Caused, Recovered, write_results
@@ -31,21 +34,16 @@ INJECTED = MotionError(
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    bumpy: of these surfaces also with bumps, each run over others. count: of straight runs, and of turns, in a set.
-    faults: presets whose causes are drawn run by run. injected: what is to be found again, in so many sets a surface.
-    resamples: of each bootstrap of these; seed: of all that is drawn.
-    """
-
-    surfaces: tuple[str, ...] = tuple(SURFACES)
-    bumpy: tuple[str, ...] = ("grass",)
-    faults: tuple[str, ...] = ("none", "good", "worn")
-    injected: MotionError = field(default_factory=lambda: INJECTED)
-    count: int = 12
-    sets: int = 10
-    resamples: int = 500
-    seed: int = 0
+    surfaces: Annotated[tuple[str, ...], Doc("Driven over.")] = tuple(SURFACES)
+    bumpy: Annotated[tuple[str, ...], Doc("Of these also with bumps, each run over others.")] = ("grass",)
+    faults: Annotated[tuple[str, ...], Doc("Presets whose causes are drawn run by run.")] = ("none", "good", "worn")
+    injected: Annotated[MotionError, Doc("What is to be found again.")] = field(default_factory=lambda: INJECTED)
+    count: Annotated[int, Doc("So many straight runs, and as many turns, in a set.", least=FEWEST)] = 12
+    sets: Annotated[int, Doc("So many sets a surface with the injected error.", least=1)] = 10
+    resamples: Annotated[int, Doc("Of each bootstrap.", least=100)] = 500
+    seed: Annotated[int, Doc("Of all that is drawn.", least=0)] = 0
 
     def __post_init__(self) -> None:
         if not self.surfaces:
@@ -54,17 +52,14 @@ class MotionConfig:
             find_surface(surface)
         for faults in self.faults:
             wheel_faults(faults)
-        if self.count < FEWEST:
-            raise InvalidInputError(f"count must be at least {FEWEST}, not {self.count}")
-        if self.sets < 1 or self.seed < 0:
-            raise InvalidInputError(f"sets must be at least 1 and seed at least 0, not {self.sets} and {self.seed}")
+        check_fields(self)
         FitOptions(resamples=self.resamples)
 
 
 def run(config: MotionConfig, stage: Stage, *, runs: Path, command: str = "") -> tuple[Path, list[ReportTable]]:
     """Drive, draw errors, fit; the run folder and the tables for the screen."""
-    with run_folder(runs, "motion") as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of("experiments motion", command)
+    with recorded_run(runs, "motion", run_of, config) as folder:
         courses = drive_all(config, stage)
         grounds = {**courses, **drive_over_bumps(config, stage)}
         with stage("errors with causes", len(config.faults) * len(grounds)) as step:
@@ -81,7 +76,9 @@ def run(config: MotionConfig, stage: Stage, *, runs: Path, command: str = "") ->
                     recovered.append(_recovered(config, courses[surface], rng))
                     step()
         with stage("drawing", 1):
-            tables = write_results(folder, caused, recovered, config.injected, facts={"command": command})
+            tables = write_results(
+                folder, caused, recovered, config.injected, facts={"command": command}, config=config
+            )
     return finished_path(folder), tables
 
 

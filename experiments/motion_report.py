@@ -51,6 +51,7 @@ def write_results(
     injected: MotionError,
     *,
     facts: Mapping[str, str],
+    config: object = None,
 ) -> list[ReportTable]:
     """Runs and fits as CSV and TOML, figures, tables.md and the report; the tables for the screen."""
     tables = [*(caused_table(caused, name) for name in faults_of(caused)), recovery_table(recovered, injected)]
@@ -72,6 +73,7 @@ def write_results(
         figures=draw(folder, caused, recovered, injected),
         facts=facts,
         tables=tables,
+        config=config,
     )
     with written_beside(folder / "tables.md") as temporary:
         temporary.write_text("\n\n".join(table.markdown for table in tables), encoding="utf-8")

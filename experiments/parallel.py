@@ -91,3 +91,17 @@ def rich_stage(what: str, total: float) -> Iterator[Step]:
                 progress.update(task, completed=share * total)
 
         yield Bar()
+
+
+@contextmanager
+def silent_stage(what: str, total: float) -> Iterator[Step]:  # noqa: ARG001
+    """A Stage that shows nothing."""
+
+    class Silence:
+        def __call__(self) -> None:
+            pass
+
+        def to(self, share: float) -> None:
+            pass
+
+    yield Silence()

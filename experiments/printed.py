@@ -5,24 +5,28 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from threading import Event
+from typing import Annotated
 
 import numpy as np
 
 from sim.faults import camera_faults
 from sim.rig import MINORU
-from stereogrid.config import MappingConfig, save_config
+from stereogrid.config import MappingConfig
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Track
 from stereogrid.observation import Recording
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.scoring import Score
 from stereogrid.scoring.map_scores import ScoredMap
 from stereogrid.scoring.truth import MapTruth
 
 from .budget import budget_mapping
-from .drives import OBSTACLES_M, DriveConfig, about, open_drive, record
+from .drives import CAMERA_FAULTS, N_SEEDS, OBSTACLES, OBSTACLES_M, DriveConfig, about, open_drive, record
 from .faulty_drive import FaultyDrive
 from .parallel import Stage, counted, in_parallel, until
 from .printed_arms import CORRECTED, CUT_OFF, FORMS, CutOff, Peaks, clamp_scores, eq11_peaks
@@ -34,22 +38,21 @@ BIN_M = 1.0
 
 @dataclass(frozen=True)
 class PrintedConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    n_seeds: faults of the cameras and noise of the odometry are drawn with the seeds 1, 2, ... n_seeds. camera_faults:
-    see sim.faults.camera_faults. mapping.motion_error: how odometry errs, and what the maps are told of it.
-    """
-
-    drive: DriveConfig = field(default_factory=lambda: DriveConfig(distance_m=15.0))
-    n_seeds: int = 3
-    camera_faults: str = "mild"
-    mapping: MappingConfig = field(default_factory=budget_mapping)
-    obstacles_m: tuple[float, ...] = OBSTACLES_M
+    drive: Annotated[DriveConfig, Doc("The drive that is mapped.")] = field(
+        default_factory=lambda: DriveConfig(distance_m=15.0)
+    )
+    n_seeds: Annotated[int, N_SEEDS] = 3
+    camera_faults: Annotated[str, CAMERA_FAULTS] = "mild"
+    mapping: Annotated[
+        MappingConfig, Doc("Of every map; its motion_error is how odometry errs, and what the maps are told.")
+    ] = field(default_factory=budget_mapping)
+    obstacles_m: Annotated[tuple[float, ...], OBSTACLES] = OBSTACLES_M
 
     def __post_init__(self) -> None:
         camera_faults(self.camera_faults)
-        if not self.n_seeds > 0:
-            raise InvalidInputError(f"n_seeds must be positive, not {self.n_seeds}")
+        check_fields(self)
         if len(self.obstacles_m) != 2 or not self.obstacles_m[0] < self.obstacles_m[1]:
             raise InvalidInputError(f"obstacles_m must be two heights, the lower first, not {self.obstacles_m}")
         for form in FORMS.values():
@@ -70,13 +73,13 @@ def run(
 ) -> tuple[Path, list[ReportTable]]:
     """Map the drive in every form with every seed; the run folder and the tables for the screen."""
     reused = open_drive(recording) if recording else None
-    with run_folder(runs, "printed") as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of("experiments printed", command, recording, made="drive.mcap")
+    with recorded_run(runs, "printed", run_of.reading(*config.mapping.matcher.files()), config) as folder:
         drive = reused or open_drive(record(config.drive, folder / "drive.mcap", stage))
         findings = measure(drive, config, stage)
         facts = {"command": command, "recording": str(recording or "drive.mcap"), **about(drive)}
         with stage("drawing", 1):
-            tables = write_results(folder, findings, facts=facts)
+            tables = write_results(folder, findings, facts=facts, config=config)
     return finished_path(folder), tables
 
 

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from stereogrid import as_printed
 from stereogrid.figures import draw_slice, save_figure
+from stereogrid.figures.colours import TRUTH_COLOUR
 from stereogrid.grid import OccupancyGrid
 from stereogrid.report import ReportFigure, ReportTable, write_metrics, write_report
 from stereogrid.scoring import SCORE_NAMES, Score, scores_to_dict
@@ -63,7 +64,13 @@ class Findings:
         return float(np.median(layers) * self.truth.labels.cell_m)
 
 
-def write_results(folder: Path, findings: Findings, *, facts: Mapping[str, str]) -> list[ReportTable]:
+def write_results(
+    folder: Path,
+    findings: Findings,
+    *,
+    facts: Mapping[str, str],
+    config: object = None,
+) -> list[ReportTable]:
     """Numbers, the figure and the report of the run; the tables for the screen."""
     tables = [scores_table(findings), differences_table(findings), eq2_table(findings), eq11_table(findings.peaks)]
     flat = {(arm, seed): scores for arm, seeds in findings.scores.items() for seed, scores in seeds.items()}
@@ -88,6 +95,7 @@ def write_results(folder: Path, findings: Findings, *, facts: Mapping[str, str])
         facts=facts,
         meanings={f"obstacle_{n}": f"{m}; obstacles" for n, (_, m) in SCORE_NAMES.items()} | CLAMP_MEANINGS,
         tables=tables,
+        config=config,
     )
     (folder / "tables.md").write_text("\n".join(table.markdown for table in tables), encoding="utf-8")
     return tables
@@ -151,7 +159,7 @@ def printed_figure(findings: Findings) -> Figure:
     for (left, right), arm in zip(panels, DRAWN, strict=True):
         draw_slice(left, findings.grids[arm], findings.height_m)
         for segment in segments_m:
-            left.plot(*segment[:, :2].T, color="#2ca02c", linewidth=0.8)
+            left.plot(*segment[:, :2].T, color=TRUTH_COLOUR, linewidth=0.8)
         left.set(xlim=(low_m[0], high_m[0]), ylim=(low_m[1], high_m[1]), ylabel="y [m]", aspect="equal")
         left.set_title(arm if arm == CORRECTED else f"as printed: {arm}", fontsize=10, loc="left")
         table = findings.truth.reliability(findings.grids[arm])

@@ -8,14 +8,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Annotated
 
 from sim.faults import PRESETS, camera_faults
 from sim.worlds.world import WORLDS
-from stereogrid.config import save_config
+from stereogrid.described import Doc, check_fields
 from stereogrid.errors import InvalidInputError, unknown_name
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 
+from .drives import DISTANCE
 from .parallel import Stage, in_parallel
 from .realism_measures import measures
 from .realism_report import Measured, write_results
@@ -24,18 +28,16 @@ from .realism_scenes import Scene, real_scenes, simulated_scenes
 
 @dataclass(frozen=True)
 class RealismConfig:
-    """Every parameter of the experiment; the file config.toml of a run holds them.
+    """Every parameter of the experiment; the file config.toml of a run holds them."""
 
-    worlds, presets: of the simulation. seed makes the worlds, noise_seed draws the cameras' noise. places: so many
-    views of each drive, and at most so many of each real sequence. distance_m: of each path, 0 = all [m].
-    """
-
-    worlds: tuple[str, ...] = field(default_factory=lambda: tuple(WORLDS))
-    presets: tuple[str, ...] = tuple(PRESETS)
-    seed: int = 0
-    noise_seed: int = 1
-    places: int = 10
-    distance_m: float = 0.0
+    worlds: Annotated[tuple[str, ...], Doc("Of the simulation.", choices=tuple(WORLDS))] = field(
+        default_factory=lambda: tuple(WORLDS)
+    )
+    presets: Annotated[tuple[str, ...], Doc("Of the cameras' faults.")] = tuple(PRESETS)
+    seed: Annotated[int, Doc("Makes the worlds.", least=0)] = 0
+    noise_seed: Annotated[int, Doc("Draws the cameras' noise.", least=0)] = 1
+    places: Annotated[int, Doc("So many views of each drive, and at most so many of each real sequence.", least=2)] = 10
+    distance_m: Annotated[float, DISTANCE] = 0.0
 
     def __post_init__(self) -> None:
         for world in self.worlds:
@@ -47,11 +49,7 @@ class RealismConfig:
             raise InvalidInputError(
                 f"worlds or presets names none; choose from: {', '.join(WORLDS)} and {', '.join(PRESETS)}"
             )
-        if self.places < 2:
-            raise InvalidInputError(f"places must be at least 2, not {self.places}")
-        for name in ("seed", "noise_seed", "distance_m"):
-            if not getattr(self, name) >= 0:
-                raise InvalidInputError(f"{name} must be >= 0, not {getattr(self, name)}")
+        check_fields(self)
 
 
 def run(
@@ -60,13 +58,13 @@ def run(
     """Measure every scene that there is; the run folder and the tables for the screen. data: none: simulated alone."""
     if data is not None and not data.is_dir():
         raise InvalidInputError(f"{data}: no such folder of data")
-    with run_folder(runs, "realism") as folder:
-        save_config(config, folder / "config.toml")
+    run_of = RunRecord.of("experiments realism", command).reading(("data", data))
+    with recorded_run(runs, "realism", run_of, config) as folder:
         real, skipped = real_scenes(data, config.places)  # first: damaged data are refused early
         measured = measure([*real, *drive_through(config, stage)], stage)
         with stage("drawing", 1):
             facts = {"command": command, "worlds": ", ".join(config.worlds), "seed": str(config.seed)}
-            tables = write_results(folder, measured, skipped=skipped, facts=facts)
+            tables = write_results(folder, measured, skipped=skipped, facts=facts, config=config)
     return finished_path(folder), tables
 
 

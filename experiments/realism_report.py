@@ -43,7 +43,12 @@ Groups = Mapping[tuple[str, str], Sequence[Measured]]
 
 
 def write_results(
-    folder: Path, measured: Sequence[Measured], *, skipped: Sequence[str], facts: Mapping[str, str]
+    folder: Path,
+    measured: Sequence[Measured],
+    *,
+    skipped: Sequence[str],
+    facts: Mapping[str, str],
+    config: object = None,
 ) -> list[ReportTable]:
     """metrics.json, tables.md, figures and the report of the run; the tables for the screen."""
     groups = grouped(measured)
@@ -69,6 +74,7 @@ def write_results(
         figures=figures,
         facts=facts,
         tables=tables,
+        config=config,
     )
     write_markdown(folder / "tables.md", tables, skipped, facts)
     halves = ([n for n in MEASURES if n.endswith(OF_MATCHING)], [n for n in MEASURES if not n.endswith(OF_MATCHING)])

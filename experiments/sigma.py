@@ -6,7 +6,7 @@ scenes out of the fit and counts on it; two more carry the tables from the real 
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -20,8 +20,10 @@ from stereogrid.figures import save_figure
 from stereogrid.files import written_beside
 from stereogrid.matching import MATCHERS, matcher
 from stereogrid.matching.sigma import GENERIC, SigmaTable, sigma_tables
+from stereogrid.recorded_run import recorded_run
 from stereogrid.report import ReportTable, write_metrics
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 
 from .parallel import Stage, in_parallel
 from .sigma_fit import Coverage, Sample, coverage, fit
@@ -84,7 +86,8 @@ def run(
     for name in chosen:
         if name not in with_table:
             raise unknown_name("matcher with a table", name, with_table)
-    with run_folder(runs, "sigma") as folder:
+    run_of = RunRecord.of("experiments sigma", command).reading(("data", data))
+    with recorded_run(runs, "sigma", replace(run_of, matchers=tuple(names))) as folder:
         with stage("preparing scenes", 1):
             seen = list(scenes(data))
         samples = {}

@@ -1,5 +1,10 @@
 """`python -m hardware drive --robot tcp:127.0.0.1:8101 --camera http://127.0.0.1:8102/`; doctor, calibrate and more."""
 
+from stereogrid.early import end_at_once
+
+if __name__ == "__main__":
+    end_at_once()
+
 import sys
 
 import typer

@@ -1,5 +1,10 @@
 """`python -m sim record corridor --out drive.mcap`; firmware, view and export beside it."""
 
+from stereogrid.early import end_at_once
+
+if __name__ == "__main__":
+    end_at_once()
+
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,6 +1,6 @@
 """The rectified stereo pair, and how a real, distorted pair becomes one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -13,6 +13,8 @@ from .geometry import FloatArray, as_floats, as_pose, from_rotation
 SIDES = ("left", "right")
 DISTORTION_SIZES = (4, 5, 8, 12, 14)
 """How many coefficients OpenCV's pinhole distortion may have."""
+MOST_PX = 8192
+"""Of the width and height of pictures that are rectified: maps of as many pixels are made for it."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,12 @@ class StereoCamera:
         for name in ("cx_px", "cy_px"):
             if not np.isfinite(getattr(self, name)):
                 raise InvalidInputError(f"{name} must be finite, not {getattr(self, name)}")
+
+    def __repr__(self) -> str:
+        return (
+            f"StereoCamera({self.width_px} x {self.height_px} px, focal {self.focal_px:.2f} px, centre "
+            f"({self.cx_px:.2f}, {self.cy_px:.2f}) px, baseline {self.baseline_m:.4f} m)"
+        )
 
     @classmethod
     def from_projections(cls, P_left: ArrayLike, P_right: ArrayLike, size_px: tuple[int, int]) -> "StereoCamera":
@@ -151,17 +159,37 @@ def _rotation(R: ArrayLike, side: str) -> FloatArray:
     return as_pose(from_rotation(matrix), f"the {side} R")[:3, :3]
 
 
+def _check_size(size_px: tuple[int, int]) -> None:
+    if not all(0 < each <= MOST_PX for each in size_px):
+        raise InvalidInputError(
+            f"pictures of {size_px[0]} x {size_px[1]} px; 1 to {MOST_PX} px a side can be rectified"
+        )
+
+
+@dataclass(frozen=True)
+class RigMatrices:
+    """What ROS calls K (3, 3), D, R (3, 3) and P (3, 4) of the (left, right) camera, whose pictures are of size_px."""
+
+    K: tuple[FloatArray, FloatArray]
+    distortion: tuple[FloatArray, FloatArray]
+    R: tuple[FloatArray, FloatArray]
+    P: tuple[FloatArray, FloatArray]
+    size_px: tuple[int, int]
+
+
 @dataclass(frozen=True)
 class Rectification:
     """Maps a raw, distorted pair to a rectified one.
 
     camera: the rectified pair. R_rect_left (3, 3): p_rect = R_rect_left @ p_left for the raw left optical frame.
+    matrices: what it was made from; they are of the raw pictures.
     """
 
     camera: StereoCamera
     R_rect_left: FloatArray
-    maps_left: tuple[NDArray[np.float32], NDArray[np.float32]]
-    maps_right: tuple[NDArray[np.float32], NDArray[np.float32]]
+    maps_left: tuple[NDArray[np.float32], NDArray[np.float32]] = field(repr=False)
+    maps_right: tuple[NDArray[np.float32], NDArray[np.float32]] = field(repr=False)
+    matrices: RigMatrices
 
     @classmethod
     def from_calibration(
@@ -173,9 +201,10 @@ class Rectification:
     ) -> "Rectification":
         """From (left, right) intrinsics (3, 3), OpenCV distortions, T_right_left (4, 4) and (width, height).
 
-        Invalid pixels are cropped away (alpha = 0). Raises InvalidInputError when a number is missing or the
-        right camera is not to the right of the left one.
+        Invalid pixels are cropped away (alpha = 0). Raises InvalidInputError when a number is missing, the right
+        camera is not to the right of the left one, or pictures are of no size up to MOST_PX.
         """
+        _check_size(size_px)
         (K0, D0), (K1, D1) = (_intrinsics(*each) for each in zip(K, distortion, SIDES, strict=True))
         T = as_pose(T_right_left, "T_right_left")
         if not T[:3, 3].any():
@@ -195,11 +224,17 @@ class Rectification:
         R: tuple[ArrayLike, ArrayLike],
         P: tuple[ArrayLike, ArrayLike],
         size_px: tuple[int, int],
+        raw_shape: tuple[int, int] | None = None,
     ) -> "Rectification":
         """From what ROS calls K (3, 3), D, R (3, 3) and P (3, 4) of the (left, right) camera, and (width, height).
 
-        Raises InvalidInputError when a number is missing or these are not the matrices of one pair.
+        raw_shape: (height, width) of the raw images, where they are not as large as the rectified ones.
+        Raises InvalidInputError when a number is missing, these are not the matrices of one pair, or pictures are of no
+        size up to MOST_PX.
         """
+        raw_px = size_px if raw_shape is None else (raw_shape[1], raw_shape[0])
+        for each in (size_px, raw_px):
+            _check_size(each)
         camera = StereoCamera.from_projections(*P, size_px)
         turns = [_rotation(each, side) for each, side in zip(R, SIDES, strict=True)]
         numbers = [_intrinsics(*each) for each in zip(K, distortion, SIDES, strict=True)]
@@ -207,13 +242,20 @@ class Rectification:
             cv2.initUndistortRectifyMap(*each, turn, as_floats(projection), size_px, cv2.CV_32FC1)
             for each, turn, projection in zip(numbers, turns, P, strict=True)
         )
-        return cls(camera, turns[0], tuple(left), tuple(right))
+        (K0, D0), (K1, D1) = numbers
+        matrices = RigMatrices((K0, K1), (D0, D1), (turns[0], turns[1]), (as_floats(P[0]), as_floats(P[1])), raw_px)
+        return cls(camera, turns[0], tuple(left), tuple(right), matrices)
+
+    @property
+    def raw_shape(self) -> tuple[int, int]:
+        """(height, width) of the raw images."""
+        return self.matrices.size_px[1], self.matrices.size_px[0]
 
     def rectify(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         """The rectified pair, each (H, W) uint8."""
         for side, image in (("left", left), ("right", right)):
-            if image.shape[:2] != self.camera.shape:
-                raise InvalidInputError(f"the {side} image is {image.shape[:2]}, the calibration {self.camera.shape}")
+            if image.shape[:2] != self.raw_shape:
+                raise InvalidInputError(f"the {side} image is {image.shape[:2]}, the calibration {self.raw_shape}")
         return (
             cv2.remap(left, *self.maps_left, cv2.INTER_LINEAR),
             cv2.remap(right, *self.maps_right, cv2.INTER_LINEAR),

@@ -2,18 +2,25 @@
 
 import math
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
 
 from .camera import StereoCamera
-from .errors import InvalidInputError
+from .described import Doc, check_fields
+from .errors import InvalidInputError, unknown_name
 from .grid import DEFAULT_CLAMP, OccupancyGrid
+from .grid.fusion import FUSIONS
 from .mapper import Mapper
-from .matching import matcher
+from .matching import MATCHERS, matcher
 from .matching.correlation import error_reach
+from .matching.onnx_network import NetworkDescription
 from .motion import MotionError
 from .observation import Matcher
 from .sensor_model import SensorModel
 from .tomlfile import config_from_table, load_config, save_config
 
+RECORDED = "recorded"
+"""In place of a matcher's name: the disparities that the recording itself carries (Observation.disparity)."""
 TYPICAL_SIGMA_PX = 0.3
 USEFUL_SIGMA_M = 0.1
 CELLS_A_RANGE = 80
@@ -21,40 +28,73 @@ CELLS_A_RANGE = 80
 
 @dataclass(frozen=True)
 class MatcherConfig:
-    """[matcher]: name of the matcher, disparities searched [px]; network: the TOML file that describes onnx's."""
+    """How disparities are found. What each field is stands beside it, and in every config.toml.
 
-    name: str = "bm"
-    num_disparities: int = 64
-    network: str = ""
+    The name "recorded" stands for no matcher: the disparities are those that the recording carries.
+    """
+
+    name: Annotated[str, Doc("Which matcher.", choices=(*MATCHERS, RECORDED))] = "bm"
+    num_disparities: Annotated[
+        int, Doc("Disparities searched, from 0 upwards; bm and sgbm need a multiple of 16.", "px", above=0)
+    ] = 64
+    network: Annotated[str, Doc("The TOML file that describes the network of the matcher onnx; else empty.")] = ""
 
     def __post_init__(self) -> None:
+        check_fields(self, but=("name",))
         if self.network and self.name != "onnx":
             raise InvalidInputError(f"network is for the matcher 'onnx'; {self.name!r} takes none")
 
+    def files(self) -> list[tuple[str, Path]]:
+        """What is read from files, as RunRecord.reading takes it: onnx's network and the weights that it names."""
+        if not self.network:
+            return []
+        weights = load_config(NetworkDescription, self.network).weights
+        return [("network", Path(self.network)), ("weights", Path(self.network).parent / weights)]
+
     def build(self) -> Matcher:
-        """The matcher. Raises InvalidInputError for one that there is not."""
+        """The matcher. Raises InvalidInputError for one that there is not, "recorded" too."""
+        if self.name == RECORDED:
+            names = ", ".join(sorted(MATCHERS))
+            raise InvalidInputError(
+                f"matcher {RECORDED!r} matches no images; where they are to be, choose from: {names}"
+            )
+        if self.name not in MATCHERS:
+            raise unknown_name("matcher", self.name, (*MATCHERS, RECORDED))
         network = {"network": self.network} if self.network else {}
         return matcher(self.name, num_disparities=self.num_disparities, **network)
 
 
 @dataclass(frozen=True)
 class GridConfig:
-    """[grid]: cell size [m], fusion rule, lowest and highest log-odds ([] = no limit), memory limit [GB]."""
+    """The map's cells, and how readings are fused into them."""
 
-    cell_m: float = 0.05
-    fusion: str = "cell"
-    clamp: tuple[float, ...] = DEFAULT_CLAMP
-    memory_limit_gb: float = 4.0
+    cell_m: Annotated[float, Doc("Edge of a cell.", "m", above=0)] = 0.05
+    fusion: Annotated[
+        str, Doc("The rule: one look at a cell an observation, or the literal sum of rays.", choices=tuple(FUSIONS))
+    ] = "cell"
+    clamp: Annotated[
+        tuple[float, ...], Doc("Lowest and highest log-odds that a cell may reach, around 0; [] for no limit.", "nat")
+    ] = DEFAULT_CLAMP
+    memory_limit_gb: Annotated[float, Doc("The map may not grow beyond it.", "GB", above=0)] = 4.0
+
+    def __post_init__(self) -> None:
+        check_fields(self, but=("fusion",))
 
 
 @dataclass(frozen=True)
 class MappingConfig:
     """What turns a recording into a map. The sections of the TOML file bear the names of the fields."""
 
-    matcher: MatcherConfig = field(default_factory=MatcherConfig)
-    model: SensorModel = field(default_factory=SensorModel)
-    motion_error: MotionError = field(default_factory=MotionError)
-    grid: GridConfig = field(default_factory=GridConfig)
+    matcher: Annotated[MatcherConfig, Doc("How disparities are found.")] = field(default_factory=MatcherConfig)
+    model: Annotated[SensorModel, Doc("What one reading says of the cells on its ray.")] = field(
+        default_factory=SensorModel
+    )
+    motion_error: Annotated[MotionError, Doc("How far off poses may be, and what the map makes of it.")] = field(
+        default_factory=MotionError
+    )
+    grid: Annotated[GridConfig, Doc("The map's cells, and how readings are fused into them.")] = field(
+        default_factory=GridConfig
+    )
 
     @classmethod
     def for_camera(cls, camera: StereoCamera) -> "MappingConfig":
@@ -81,7 +121,16 @@ class MappingConfig:
             clamp=self.grid.clamp or None,
             memory_limit_gb=self.grid.memory_limit_gb,
         )
-        return Mapper(camera, self.matcher.build(), grid, self.motion_error, reach=error_reach(self.matcher.name))
+        matcher = None if self.matcher.name == RECORDED else self.matcher.build()
+        return Mapper(camera, matcher, grid, self.motion_error, reach=error_reach(self.matcher.name))
 
 
-__all__ = ["GridConfig", "MappingConfig", "MatcherConfig", "config_from_table", "load_config", "save_config"]
+__all__ = [
+    "RECORDED",
+    "GridConfig",
+    "MappingConfig",
+    "MatcherConfig",
+    "config_from_table",
+    "load_config",
+    "save_config",
+]

@@ -1,5 +1,6 @@
 """One root for everything that a user can put right; cli.py turns it into one line and exit code 1."""
 
+import difflib
 from collections.abc import Iterable
 
 
@@ -28,5 +29,8 @@ class MissingExtraError(StereogridError, ImportError):
 
 
 def unknown_name(kind: str, name: str, choices: Iterable[str]) -> InvalidInputError:
-    """The error for a name that is in no table: `no matcher named 'sgmb'; choose from: bm, sgbm`."""
-    return InvalidInputError(f"no {kind} named {name!r}; choose from: {', '.join(sorted(choices))}")
+    """The error for a name that is in no table: `no matcher named 'sgmb'; did you mean 'sgbm'? choose from: ...`."""
+    names = sorted(choices)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ";"
+    return InvalidInputError(f"no {kind} named {name!r}{hint} choose from: {', '.join(names)}")

@@ -1,6 +1,7 @@
 """Files written beside and renamed, so that a reader never sees half of one."""
 
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +24,28 @@ def written_beside(path: Path) -> Iterator[Path]:
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be written ({error.strerror})") from error
+
+
+@contextmanager
+def folder_beside(path: Path) -> Iterator[Path]:
+    """Yield a new hidden folder in path's folder; renamed to path on success, removed with all in it on failure.
+
+    Raises InvalidInputError, naming path, when it is there already or cannot be written.
+    """
+    if path.exists():
+        raise InvalidInputError(f"{path}: exists already; choose another path")
+    if not path.parent.is_dir():
+        raise InvalidInputError(f"{path.parent}: no such folder, so {path.name} cannot be written there")
+    try:
+        partial = Path(tempfile.mkdtemp(prefix=f".{path.name}-", suffix=".partial", dir=path.parent))
+        try:
+            yield partial
+            partial.chmod(0o755)
+            partial.rename(path)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
     except OSError as error:
         raise InvalidInputError(f"{path}: cannot be written ({error.strerror})") from error
 

@@ -44,6 +44,28 @@ def as_pose(T: ArrayLike, name: str = "pose") -> FloatArray:
     return pose
 
 
+ROUNDING = 0.01
+"""Largest deviation of a rotation's numbers from those of the nearest one, in files that round them."""
+
+
+def nearest_pose(T: ArrayLike, name: str = "pose") -> FloatArray:
+    """The pose (4, 4) with the rotation nearest to that of T (3, 4) or (4, 4), as files that round its numbers need it.
+
+    Raises InvalidInputError when a number is not finite or the nearest rotation is farther off than ROUNDING.
+    """
+    matrix = as_floats(T)
+    if matrix.shape not in ((3, 4), (4, 4)) or not np.isfinite(matrix).all():
+        raise InvalidInputError(f"{name} must be a finite (3, 4) or (4, 4) matrix")
+    u, _, vt = np.linalg.svd(matrix[:3, :3])
+    rotation = u @ vt
+    off = float(np.abs(rotation - matrix[:3, :3]).max())
+    if off > ROUNDING or not np.linalg.det(rotation) > 0:
+        raise InvalidInputError(f"{name} is no rotation and position: it is off by {off:.2g}")
+    if matrix.shape == (4, 4) and np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
+        raise InvalidInputError(f"{name} must end with the row 0 0 0 1, not {matrix[3].tolist()}")
+    return from_rotation(rotation, matrix[:3, 3])
+
+
 COVARIANCE_TOLERANCE = 1e-6
 """How far a covariance may be from symmetric and from positive semidefinite, relative: it may be float32."""
 

@@ -1,9 +1,27 @@
-"""Interrupts that wait until what is being done is done."""
+"""Interrupts that are raised, or that wait until what is being done is done."""
 
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+
+@contextmanager
+def raised_interrupts() -> Iterator[None]:
+    """Within it an interrupt, unless it is ignored, and a request to terminate are raised as KeyboardInterrupt."""
+    if threading.current_thread() is not threading.main_thread():  # where no signal arrives
+        yield
+        return
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    numbers = [signal.SIGTERM] if ignored else [signal.SIGTERM, signal.SIGINT]
+    before = {each: signal.getsignal(each) for each in numbers}
+    try:
+        for each in numbers:
+            signal.signal(each, signal.default_int_handler)
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 @contextmanager

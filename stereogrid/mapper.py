@@ -3,6 +3,7 @@
 from typing import Any
 
 from .camera import StereoCamera
+from .errors import InvalidInputError
 from .grid import OccupancyGrid
 from .matching.correlation import ErrorReach
 from .motion import MotionError, PoseUncertainty
@@ -15,13 +16,14 @@ from .submaps import Submaps
 class Mapper:
     """Turns observations, in their order, into a map. camera: the rectified pair they come from.
 
+    matcher: None takes the disparities that the observations themselves carry.
     reach: how far the matcher's errors go together in time; None: every observation counts in full.
     """
 
     def __init__(
         self,
         camera: StereoCamera,
-        matcher: Matcher,
+        matcher: Matcher | None,
         grid: OccupancyGrid,
         motion_error: MotionError | None = None,
         *,
@@ -38,9 +40,17 @@ class Mapper:
 
     def step(self, observation: Observation) -> Disparity:
         """Fuse one observation into the grid and return its disparity."""
-        disparity = self.matcher.match(observation.left, observation.right)
+        disparity = self.disparity(observation)
         self.fuse(observation, disparity)
         return disparity
+
+    def disparity(self, observation: Observation) -> Disparity:
+        """The matcher's, or the observation's own; InvalidInputError where it has none."""
+        if self.matcher is not None:
+            return self.matcher.match(observation.left, observation.right)
+        if observation.disparity is None:
+            raise InvalidInputError(f"the observation at {observation.stamp_s} s carries no disparity: give a matcher")
+        return observation.disparity
 
     def fuse(self, observation: Observation, disparity: Disparity) -> None:
         """Fuse an observation whose disparity is already known."""

@@ -1,76 +1,45 @@
 """A whole run of the mapper on a recording: map, checks, figures and report in one run folder."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from .camera import StereoCamera
-from .config import MappingConfig, save_config
-from .errors import InvalidInputError, MapTooLargeError, RecordingError
-from .figures import cubes_figure, disparity_figure, save_figure, slice_figure
+from .config import MappingConfig
+from .errors import MapTooLargeError, RecordingError
 from .files import check_writable
-from .geometry import FloatArray
 from .grid import OccupancyGrid
+from .map_report import write_mapped
+from .map_truth import known_truth
+from .mapped import HasCamera, Mapped, Track, untracked
 from .observation import Disparity, Observation, Recording
-from .report import ReportFigure, write_metrics, write_report
-from .runs import finished_path, run_folder
-from .scoring import Score, scores_to_dict
-from .scoring.ground import camera_height
+from .recorded_run import recorded_run
+from .recording import FileRecording
+from .run_record import OUTSIDE, RunRecord
+from .runs import finished_path
+from .scoring import Score
 
-Item = TypeVar("Item")
-
-
-class Track(Protocol):
-    """Yields items and shows how many of total are done; `what` says what is being done to them."""
-
-    def __call__(self, items: Iterable[Item], what: str, total: int) -> Iterator[Item]: ...
-
-
-class HasCamera(Protocol):
-    """Whatever knows the rectified pair: a recording, live cameras."""
-
-    @property
-    def camera(self) -> StereoCamera: ...
-
-
-@dataclass(frozen=True)
-class Mapped:
-    """A map and what is remembered of its making.
-
-    path_T_world_cam (M, 4, 4): where the camera was taken to be; sample: an observation a quarter of
-    the way down the drive with its disparity, for figures; density: mean share of matched pixels;
-    stopped: what the map could not grow beyond, after the M observations that it holds.
-    """
-
-    grid: OccupancyGrid
-    path_T_world_cam: FloatArray
-    sample: tuple[Observation, Disparity]
-    density: float
-    stopped: MapTooLargeError | None = None
-
-    @property
-    def path_m(self) -> FloatArray:
-        """Positions of the camera (M, 3) in world [m]."""
-        return self.path_T_world_cam[:, :3, 3]
+__all__ = [
+    "HasCamera",
+    "Mapped",
+    "MappingResult",
+    "Track",
+    "build_map",
+    "map_recording",
+    "map_while_it_fits",
+    "untracked",
+    "write_mapped",
+]
 
 
 @dataclass(frozen=True)
 class MappingResult:
-    """folder: where everything stands; grid: the map; scores: what can be said without a true mesh."""
+    """folder: where everything stands; grid: the map; scores: of it, those against a truth too where one is known."""
 
     folder: Path
     grid: OccupancyGrid
     scores: list[Score]
-
-
-def untracked(items: Iterable[Item], what: str, total: int) -> Iterator[Item]:  # noqa: ARG001
-    """No progress bar."""
-    yield from items
 
 
 def build_map(
@@ -110,7 +79,7 @@ def map_while_it_fits(
         mapper.fuse(observation, disparity)
         return disparity
 
-    poses, densities, sample, stopped = [], [], None, None
+    poses, stamps_s, densities, sample, stopped = [], [], [], None, None
     for n, observation in enumerate(track(recording, "mapping", len(recording))):
         try:
             disparity = step(observation)
@@ -120,6 +89,7 @@ def map_while_it_fits(
             stopped = error
             break
         poses.append(observation.T_world_cam)
+        stamps_s.append(observation.stamp_s)
         densities.append(disparity.density)
         # The latest one until then: a drive may end before its first quarter.
         if n <= len(recording) // 4:
@@ -130,7 +100,8 @@ def map_while_it_fits(
         mapper.finish()
     except MapTooLargeError as error:
         stopped = stopped or error
-    return Mapped(mapper.grid, np.array(poses), sample, float(np.mean(densities)), stopped)
+    density = float(np.mean(densities))
+    return Mapped(mapper.grid, np.array(poses), sample, density, stopped, np.array(stamps_s))
 
 
 def map_recording(
@@ -140,21 +111,37 @@ def map_recording(
     name: str,
     runs: Path,
     out: Path | None = None,
-    command: str = "",
+    record: RunRecord | None = None,
     track: Track = untracked,
+    score: bool | None = False,
+    truth_of: object = None,
 ) -> MappingResult:
-    """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid).
+    """Map a recording into runs/<stamp>-<name>/; out: where else to save the map (.sgrid); record: for its run.toml.
 
+    score: whether to score the map against the recording's truth; None: where it carries one and that can be done, and
+    else the report says why not. truth_of: what carries the truth, where that is not the recording itself.
     Where the map outgrows its memory limit, all is written of the map so far, and then MapTooLargeError raised.
     """
     if out is not None:
         check_writable(out)
     config.build_mapper(recording.camera)  # refuses what cannot work before anything is written
-    with run_folder(runs, name) as folder:
+    record = record or RunRecord("map")
+    source = recording if truth_of is None else truth_of
+    outside = source.files_outside if isinstance(source, FileRecording) else ()
+    record = record.reading_once(*((OUTSIDE, each) for each in outside))
+    with recorded_run(runs, name, record.reading(*config.matcher.files()), config) as folder:
+        truth = known_truth(source, config, score, track)
         mapped = map_while_it_fits(recording, config, track)
-        facts = {"command": command} | _stop(mapped, recording)
+        facts = {"command": record.command} | _stop(mapped, recording)
         scores = write_mapped(
-            folder, mapped, config, source=recording, title=f"Map of {name}", facts=facts, track=track
+            folder,
+            mapped,
+            source=recording,
+            title=f"Map of {name}",
+            facts=facts,
+            track=track,
+            truth=truth,
+            config=config,
         )
         if out is not None:
             mapped.grid.save(out)
@@ -164,93 +151,8 @@ def map_recording(
     return MappingResult(finished_path(folder), mapped.grid, scores)
 
 
-def write_mapped(
-    folder: Path,
-    mapped: Mapped,
-    config: MappingConfig,
-    *,
-    source: HasCamera,
-    title: str,
-    facts: Mapping[str, str],
-    track: Track = untracked,
-) -> list[Score]:
-    """Write map, config, metrics, figures and report of a map of what `source` saw; what can be said without truth."""
-    scores = _scores(mapped)
-    save_config(config, folder / "config.toml")
-    mapped.grid.save(folder / "map.sgrid")
-    write_metrics(folder, {**facts, "scores": scores_to_dict(scores)})
-    write_report(
-        folder,
-        title,
-        summary=f"{len(mapped.path_m)} observations, {mapped.grid!r}",
-        arms={"map": scores},
-        figures=draw_map(mapped, source, folder, track),
-        facts={**facts, "map sha256": mapped.grid.sha256()},
-    )
-    return scores
-
-
-def _scores(mapped: Mapped) -> list[Score]:
-    return [
-        camera_height(mapped.grid, mapped.path_m),
-        Score("disparity_density", mapped.density, "1", len(mapped.path_m)),
-        Score("known_cells", mapped.grid.n_known, "cell", mapped.grid.n_known),
-    ]
-
-
 def _stop(mapped: Mapped, recording: Recording) -> dict[str, str]:
     """Why and where the mapping stopped; nothing of a whole map."""
     if mapped.stopped is None:
         return {}
     return {"stopped": f"{mapped.stopped}: stopped after {len(mapped.path_m)} of {len(recording)} observations"}
-
-
-def draw_map(
-    mapped: Mapped,
-    source: HasCamera,
-    folder: Path,
-    track: Track = untracked,
-    *,
-    truth_segments_m: FloatArray | None = None,
-) -> list[ReportFigure]:
-    """Disparity, slice and cubes of a map as PNG files in folder; what the map has nothing to show of is left out."""
-    observation, disparity = mapped.sample
-    height_m = float(np.median(mapped.path_m[:, 2]))
-    drawings: list[tuple[str, str, Callable[[], Figure]]] = [
-        (
-            "disparity",
-            "The left image a quarter of the way down the drive, and its disparity.",
-            lambda: disparity_figure(observation.left, disparity),
-        ),
-        (
-            "slice",
-            f"Slice of the map parallel to the ground at the camera's median height, z = {height_m:.2f} m (Fig. 7).",
-            lambda: slice_figure(mapped.grid, height_m, path_m=mapped.path_m, truth_segments_m=truth_segments_m),
-        ),
-        (
-            "cubes",
-            "Occupied cells as cubes, higher ones lighter, ground in grey; the camera in red (Fig. 9). "
-            "Cells more than 1 m above the camera are left out.",
-            lambda: _draw_cubes(mapped, source),
-        ),
-    ]
-    figures = []
-    for name, caption, draw in track(drawings, "drawing", len(drawings)):
-        # A map without a cell at that height is a poor map, but no reason to lose it.
-        with suppress(InvalidInputError):
-            figures.append(ReportFigure(save_figure(draw(), folder / f"{name}.png"), caption))
-    return figures
-
-
-def _draw_cubes(mapped: Mapped, source: HasCamera) -> Figure:
-    ground_m = -camera_height(mapped.grid, mapped.path_m).value
-    up_m = max(3.0, 0.4 * mapped.grid.model.max_range_m)
-    return cubes_figure(
-        mapped.grid,
-        mapped.sample[0].T_world_cam,
-        source.camera,
-        back_and_up_m=(1.4 * up_m, up_m),
-        path_m=mapped.path_m,
-        heights_m=(-np.inf, 1.0),
-        ground_m=ground_m + 1.6 * mapped.grid.cell_m if np.isfinite(ground_m) else None,
-    )

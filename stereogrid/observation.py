@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from .camera import StereoCamera
 from .errors import InvalidInputError
-from .geometry import FloatArray, as_pose
+from .geometry import FloatArray, as_pose, yaw_rad
+from .thumbnails import disparity_picture, pair_picture, shown
 
 Image = NDArray[np.uint8]
 FloatImage = NDArray[np.float32]
@@ -35,6 +36,13 @@ class Odometry:
                 f"travelled_m and turned_rad must be >= 0, not {self.travelled_m} and {self.turned_rad}"
             )
 
+    def __repr__(self) -> str:
+        heading_deg = np.degrees(yaw_rad(self.T_odom_base))
+        return (
+            f"Odometry({_place(self.T_odom_base)}, heading {heading_deg:.1f} deg; travelled {self.travelled_m:.3f} m, "
+            f"turned {self.turned_rad:.3f} rad)"
+        )
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -50,12 +58,18 @@ class Truth:
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_world_cam", as_pose(self.T_world_cam, "true T_world_cam"))
 
+    def __repr__(self) -> str:
+        depth = "" if self.depth_m is None else ", depth " + " x ".join(map(str, self.depth_m.shape)) + " [m]"
+        movers = f", {len(self.movers)} movers" if self.movers else ""
+        return f"Truth(camera at {_place(self.T_world_cam)}{depth}{movers})"
+
 
 @dataclass(frozen=True)
 class Observation:
     """One stereo reading: rectified images (H, W) uint8, odometry, and the left camera's claimed pose.
 
-    T_world_cam (4, 4) is what the recording claims; truth, where known, is kept apart.
+    T_world_cam (4, 4) is what the recording claims; truth, where known, is kept apart. disparity: what the recording
+    itself measured, in place of a matcher's.
     """
 
     stamp_s: float
@@ -64,12 +78,29 @@ class Observation:
     odometry: Odometry
     T_world_cam: FloatArray
     truth: Truth | None = None
+    disparity: "Disparity | None" = None
 
     def __post_init__(self) -> None:
         check_pair(self.left, self.right)
+        if self.disparity is not None and self.disparity.disparity_px.shape != self.left.shape:
+            raise InvalidInputError(
+                f"the disparity is {self.disparity.disparity_px.shape}, the images are {self.left.shape}"
+            )
         if not np.isfinite(self.stamp_s):
             raise InvalidInputError(f"stamp_s must be finite, not {self.stamp_s}")
         object.__setattr__(self, "T_world_cam", as_pose(self.T_world_cam, "T_world_cam"))
+
+    def __repr__(self) -> str:
+        extra = "".join(f", with {name}" for name in ("truth", "disparity") if getattr(self, name) is not None)
+        size = f"{self.left.shape[1]} x {self.left.shape[0]} px"
+        return f"Observation(at {self.stamp_s:.3f} s, pair of {size}, camera at {_place(self.T_world_cam)}{extra})"
+
+    def _repr_html_(self) -> str:
+        return shown(repr(self), pair_picture(self.left, self.right), "left and right image")
+
+
+def _place(T: FloatArray) -> str:
+    return "({:.3f}, {:.3f}, {:.3f}) m".format(*T[:3, 3])
 
 
 def check_pair(left: NDArray[Any], right: NDArray[Any]) -> None:
@@ -77,7 +108,9 @@ def check_pair(left: NDArray[Any], right: NDArray[Any]) -> None:
     for side, image in (("left", left), ("right", right)):
         if not isinstance(image, np.ndarray) or image.ndim != 2 or image.dtype != np.uint8:
             seen = f"{getattr(image, 'shape', type(image).__name__)} {getattr(image, 'dtype', '')}".strip()
-            raise InvalidInputError(f"the {side} image must be (H, W) uint8, not {seen}")
+            colour = isinstance(image, np.ndarray) and image.ndim == 3 and image.shape[2] in (3, 4)
+            hint = "; make it grey first, as by cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)" if colour else ""
+            raise InvalidInputError(f"the {side} image must be (H, W) uint8, not {seen}{hint}")
     if left.shape != right.shape:
         raise InvalidInputError(f"left and right images differ in size: {left.shape} and {right.shape}")
 
@@ -111,6 +144,20 @@ class Disparity:
             raise InvalidInputError("sigma_px is NaN where disparity_px is not: a match needs both")
         object.__setattr__(self, "disparity_px", d)
         object.__setattr__(self, "sigma_px", sigma)
+
+    def __repr__(self) -> str:
+        height, width = self.disparity_px.shape
+        if not self.valid.any():
+            return f"Disparity({width} x {height} px, nothing matched)"
+        low, high = np.nanmin(self.disparity_px), np.nanmax(self.disparity_px)
+        return (
+            f"Disparity({width} x {height} px, {100 * self.density:.0f} % matched: {low:.2f} to {high:.2f} px, "
+            f"median sigma {np.nanmedian(self.sigma_px):.2f} px)"
+        )
+
+    def _repr_html_(self) -> str:
+        caption = "disparity: near is red, far is blue, no match is white"
+        return shown(repr(self), disparity_picture(self.disparity_px), caption)
 
     @property
     def valid(self) -> NDArray[np.bool_]:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from .errors import InvalidInputError
 
+STAMP = "%Y%m%d-%H%M%S"
+"""How a run folder's name begins."""
+
 
 @contextmanager
 def run_folder(root: Path, name: str) -> Iterator[Path]:
@@ -17,7 +20,7 @@ def run_folder(root: Path, name: str) -> Iterator[Path]:
     """
     try:
         root.mkdir(parents=True, exist_ok=True)
-        partial = _claim(root, f"{datetime.now():%Y%m%d-%H%M%S}-{name}")
+        partial = _claim(root, f"{datetime.now():{STAMP}}-{name}")
     except OSError as error:
         raise InvalidInputError(f"{root}: results cannot be written there ({error.strerror})") from None
     final = finished_path(partial)
@@ -43,6 +46,14 @@ def check_runs(root: Path) -> None:
 def finished_path(partial: Path) -> Path:
     """Where a folder yielded by run_folder will stand once it is whole."""
     return partial.with_name(partial.name.removeprefix(".").removesuffix(".partial"))
+
+
+def begun(folder: Path) -> datetime | None:
+    """When the run of this folder began, by its name; None for a folder that run_folder did not make."""
+    try:
+        return datetime.strptime(finished_path(folder).name[:15], STAMP)
+    except ValueError:
+        return None
 
 
 def _claim(root: Path, name: str) -> Path:

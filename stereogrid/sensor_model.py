@@ -5,12 +5,14 @@ shows the two side by side.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import expit, ndtr
 
 from .camera import StereoCamera
+from .described import Doc, check_fields
 from .errors import InvalidInputError, unknown_name
 from .geometry import FloatArray, as_floats
 
@@ -32,17 +34,19 @@ of that width: much of what they say, they say together (0 and 1 are worse calib
 
 @dataclass(frozen=True)
 class SensorModel:
-    """Parameters of Eqs. 3, 11, 12 and 13.
+    """Parameters of Eqs. 3, 11, 12 and 13; 0 < p_free < prior < p_occupied < 1."""
 
-    p_free, p_occupied: what one reading claims at most (p_min and p_max). prior: p0 of Eq. 3.
-    max_range_m: depths beyond it are not used. form: "corrected" or "printed" (Eqs. 3 and 11 as in the paper).
-    """
-
-    p_free: float = 0.25
-    p_occupied: float = 0.9
-    prior: float = 0.5
-    max_range_m: float = 8.0
-    form: str = "corrected"
+    p_free: Annotated[
+        float, Doc("The least that one reading claims of a cell before its surface (p_min).", "1", above=0, below=1)
+    ] = 0.25
+    p_occupied: Annotated[
+        float, Doc("The most that one reading claims of the cell at its surface (p_max).", "1", above=0, below=1)
+    ] = 0.9
+    prior: Annotated[
+        float, Doc("Of a cell never updated (p0 of Eq. 3): between p_free and p_occupied.", "1", above=0, below=1)
+    ] = 0.5
+    max_range_m: Annotated[float, Doc("Depths beyond it are not used.", "m", above=0)] = 8.0
+    form: Annotated[str, Doc("Eqs. 3 and 11: corrected, or as printed in the paper.", choices=FORMS)] = "corrected"
 
     def __post_init__(self) -> None:
         if not 0 < self.p_free < self.prior < self.p_occupied < 1:
@@ -50,10 +54,9 @@ class SensorModel:
                 "expected 0 < p_free < prior < p_occupied < 1, not "
                 f"p_free {self.p_free}, prior {self.prior}, p_occupied {self.p_occupied}"
             )
-        if not (np.isfinite(self.max_range_m) and self.max_range_m > 0):
-            raise InvalidInputError(f"max_range_m must be positive and finite, not {self.max_range_m}")
         if self.form not in FORMS:
             raise unknown_name("form of the sensor model", self.form, FORMS)
+        check_fields(self)
 
 
 def log_odds(probability: ArrayLike) -> FloatArray:

@@ -10,7 +10,7 @@ from .outcome import Outcome
 from .picture_files import PicturePairs
 
 Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
-"""Shows how far a loop is: stereogrid.cli.track."""
+"""Shows how far a loop is: stereogrid.screen.track."""
 
 
 def calibrate_pairs(

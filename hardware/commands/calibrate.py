@@ -7,9 +7,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from stereogrid.cli import track
 from stereogrid.errors import InvalidInputError, StereogridError
 from stereogrid.interrupts import undisturbed
+from stereogrid.screen import track
 
 from .options import command_line
 

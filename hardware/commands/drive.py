@@ -8,6 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stereogrid.commands.options import (
+    RUNS,
+    CellOption,
+    ConfigOption,
+    DisparitiesOption,
+    MatcherOption,
+    MotionOption,
+    NetworkOption,
+    RangeOption,
+    RunsOption,
+    SetOption,
+)
 from stereogrid.errors import InvalidInputError
 from stereogrid.interrupts import undisturbed
 
@@ -29,13 +41,14 @@ def drive(
     mount: MountOption = "",
     out: Annotated[Path | None, typer.Option(help="Also save the map here (.sgrid).")] = None,
     record: Annotated[Path | None, typer.Option(help="Record the drive here (.mcap).")] = None,
-    config: Annotated[Path | None, typer.Option(help="A config.toml; the options below override it.")] = None,
-    matcher: Annotated[str | None, typer.Option(help="bm, sgbm, gc, kz2 or onnx.")] = None,
-    network: Annotated[Path | None, typer.Option(help="The TOML file that describes onnx's network.")] = None,
-    num_disparities: Annotated[int | None, typer.Option(help="Disparities searched [px].")] = None,
-    cell: Annotated[float | None, typer.Option(help="Edge of a cell [m].")] = None,
-    max_range: Annotated[float | None, typer.Option("--range", help="Depths used up to here [m].")] = None,
-    motion: Annotated[Path | None, typer.Option(help="A motion.toml, as motion-error writes it.")] = None,
+    config: ConfigOption = None,
+    matcher: MatcherOption = None,
+    network: NetworkOption = None,
+    num_disparities: DisparitiesOption = None,
+    cell: CellOption = None,
+    max_range: RangeOption = None,
+    motion: MotionOption = None,
+    settings: SetOption = None,
     size: SizeOption = "",
     fps: FpsOption = 30.0,
     swap: SwapOption = False,
@@ -45,13 +58,14 @@ def drive(
     view: Annotated[bool, typer.Option("--view", help="Show the map in the browser while it grows.")] = False,
     view_port: Annotated[int, typer.Option(help="The view's TCP port on this machine's loopback; 0: any.")] = 8103,
     patience: Annotated[float, typer.Option(help="End when robot or cameras are silent for so long [s].")] = 10.0,
-    runs: Annotated[Path, typer.Option(help="Folder of the run folders.")] = Path("runs"),
+    runs: RunsOption = RUNS,
 ) -> None:
     """Drive the robot by keyboard and map while it goes: runs/<stamp>-drive/ gets the map, figures and report."""
     with undisturbed():
-        from stereogrid.cli import chosen_config, track
+        from stereogrid.commands.chosen import chosen_config
         from stereogrid.files import check_writable
         from stereogrid.runs import check_runs
+        from stereogrid.screen import track
 
         from ..live.helm import Speeds
         from ..live.keyboard import Keyboard
@@ -90,6 +104,7 @@ def drive(
             cell=cell,
             max_range=max_range,
             motion=motion,
+            settings=settings,
         )
         shown = things.enter_context(live_view(opened.rig, mapping, view_port)) if view else None
         if shown:
@@ -104,7 +119,7 @@ def drive(
 
 def _tell(result: "DriveResult") -> None:
     """What came out of it on stdout; what went wrong as an error."""
-    from stereogrid.cli import print_scores
+    from stereogrid.screen import print_scores
 
     saved = result.saved
     places = [str(place) for place in (*(saved.places if saved else ()), *result.recorded)]

@@ -51,7 +51,7 @@ def motion(
 
 def _say_next(out: Path, surface: str, left: int) -> None:
     """What `stereogrid motion-error` makes of the file, and what to type then."""
-    from stereogrid.motion_cli import motion_error
+    from stereogrid.commands.motion_error import motion_error
 
     if not out.exists():
         return

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from stereogrid.calibration import CalibrationFile, RectifiedRig, Rig, load_calibration
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING, Check
 from stereogrid.errors import StereogridError
 from stereogrid.observation import Image
 
 from ..cameras.pairs import RawPair
-from .check import NOT_THERE, OK, PROBLEM, WARNING, Check
 
 AGAIN = "python -m hardware calibrate --camera SPEC --out rig.toml"
 POOR_RMS_PX = 1.0

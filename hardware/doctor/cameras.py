@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from itertools import groupby
 
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING, Check, split_trouble
+
 from ..cameras.discovery import VideoDevice
 from ..cameras.minoru import IDS
-from .check import NOT_THERE, OK, PROBLEM, WARNING, Check, split_trouble
 from .usb import UsbDevice
 
 USB2_BYTES = 24e6

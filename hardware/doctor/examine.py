@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from stereogrid.calibration import CalibrationFile, Rig
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, Check, split_trouble
 from stereogrid.errors import StereogridError
 
 from ..cameras import open_cameras
@@ -16,7 +17,6 @@ from ..cameras.opening import CAMERA_JSON
 from ..cameras.pairs import RawPair
 from .calibration import check_file, check_fit, check_own, check_size
 from .cameras import check_bandwidth, check_devices, check_minoru
-from .check import NOT_THERE, OK, PROBLEM, Check, split_trouble
 from .machine import check_machine
 from .permissions import User, check_group, check_node, read_groups
 from .pictures import judge, measure

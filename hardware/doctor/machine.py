@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from .check import OK, PROBLEM, WARNING, Check
+from stereogrid.checks import OK, PROBLEM, WARNING, Check
 
 PAIR_BYTES = 2 * 320 * 240
 RATE_HZ = 30.0

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from .check import NOT_THERE, OK, PROBLEM, WARNING, Check
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING, Check
 
 GROUPS = {"serial": "dialout", "video": "video"}
 """The groups that own these nodes on Debian, Ubuntu and Fedora; elsewhere the nodes themselves tell."""

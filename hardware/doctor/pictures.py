@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stereogrid.checks import OK, PROBLEM, WARNING, Check
+
 from ..cameras.pairs import RawPair, StereoPairs
 from ..clock import now_s
-from .check import OK, PROBLEM, WARNING, Check
 
 FIRST_S = 8.0
 """A webcam takes up to some seconds to its first picture."""

@@ -3,13 +3,13 @@
 import time
 from dataclasses import dataclass
 
+from stereogrid.checks import OK, PROBLEM, WARNING, Check, split_trouble
 from stereogrid.errors import StereogridError
 
 from ..pioneer.driver import Pioneer
 from ..pioneer.handshake import Session
 from ..pioneer.limits import DEFAULT_LIMITS
 from ..pioneer.robot import RobotReport
-from .check import OK, PROBLEM, WARNING, Check, split_trouble
 
 LISTEN_S = 2.0
 LEAST_REPORTS = 0.8

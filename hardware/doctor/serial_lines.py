@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .check import NOT_THERE, OK, PROBLEM, Check
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, Check
+
 from .usb import UsbDevice
 
 ADAPTERS = {

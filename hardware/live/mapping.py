@@ -153,7 +153,7 @@ class LiveMapper:
         return Observation(pair.stamp_s, left, right, odometry, odometry.T_odom_base @ self._T_base_cam)
 
     def _fuse(self, observation: Observation) -> None:
-        disparity = self._mapper.matcher.match(observation.left, observation.right)
+        disparity = self._mapper.disparity(observation)
         with self.lock:
             self._mapper.fuse(observation, disparity)
         self._memory.add(observation, disparity)
@@ -167,10 +167,12 @@ class _Memory:
     def __init__(self) -> None:
         self.samples: list[tuple[Observation, Disparity]] = []
         self._poses: list[FloatArray] = []
+        self._stamps_s: list[float] = []
         self._density = 0.0
 
     def add(self, observation: Observation, disparity: Disparity) -> None:
         self._poses.append(observation.T_world_cam)
+        self._stamps_s.append(observation.stamp_s)
         self._density += disparity.density
         # Nobody knows how long the drive will be: of 1, 2, 4, 8, ... one lies near its quarter.
         if len(self._poses) & (len(self._poses) - 1) == 0:
@@ -181,7 +183,8 @@ class _Memory:
             return None
         stopped = fault if isinstance(fault, MapTooLargeError) else None
         sample = self.samples[max(0, len(self.samples) - 3)]
-        return Mapped(grid, np.array(self._poses), sample, self._density / len(self._poses), stopped)
+        density = self._density / len(self._poses)
+        return Mapped(grid, np.array(self._poses), sample, density, stopped, np.array(self._stamps_s))
 
 
 def _mounted(rig: Rig) -> FloatArray:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from stereogrid.calibration import CalibrationFile, Mount, RectifiedRig, Rig
 from stereogrid.errors import InvalidInputError, StereogridError
-from stereogrid.geometry import FloatArray
 
 from ..cameras.pairs import StereoPairs
 from ..errors import CameraError
@@ -15,7 +14,7 @@ def rig_of(cameras: StereoPairs, calibration: CalibrationFile | None, mount: str
     """The rig that these cameras are, with its T_base_cam.
 
     calibration: None where a server tells of rectified pictures (camera.json). mount: where the left camera stands on
-    the robot, which overrules what those say; see parse_mount.
+    the robot, which overrules what those say; see Mount.parse.
     Raises CameraError, ConfigError or InvalidInputError where anything is missing or does not fit.
     """
     rig = calibration or _said(cameras)
@@ -27,7 +26,7 @@ def rig_of(cameras: StereoPairs, calibration: CalibrationFile | None, mount: str
             "network cameras, where they are served), or calibrate anew"
         )
     if mount:
-        return replace(rig, T_base_cam=parse_mount(mount))
+        return replace(rig, T_base_cam=Mount.parse(mount).T_base_cam)
     if rig.T_base_cam is None:
         raise InvalidInputError(
             "the calibration does not say where the left camera stands on the robot: "
@@ -44,17 +43,6 @@ def _said(cameras: StereoPairs) -> RectifiedRig:
         return RectifiedRig.from_table(about)
     except StereogridError as error:
         raise CameraError(f"{cameras.name}: camera.json: {error}") from error
-
-
-def parse_mount(text: str) -> FloatArray:
-    """T_base_cam (4, 4) from "x,y,z" or "x,y,z,pitch,yaw,roll" (or fewer), as calibration.Mount has them."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-        if not 3 <= len(numbers) <= 6:
-            raise ValueError
-    except ValueError:
-        raise InvalidInputError(f"--mount must be x,y,z or x,y,z,pitch,yaw,roll [m, degrees], not {text!r}") from None
-    return Mount(*numbers).T_base_cam
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -10,7 +10,10 @@ from stereogrid.config import MappingConfig
 from stereogrid.errors import StereogridError
 from stereogrid.files import make_folder
 from stereogrid.mapping_run import HasCamera, Mapped, Track, untracked, write_mapped
-from stereogrid.runs import finished_path, run_folder
+from stereogrid.recorded_run import recorded_run
+from stereogrid.report import duration_text
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import finished_path
 from stereogrid.scoring import Score
 
 
@@ -31,21 +34,26 @@ def save_drive(
     runs: Path,
     out: Path | None,
     facts: dict[str, str],
+    recorded: Path | None = None,
     track: Track = untracked,
 ) -> Saved:
     """The map first, to a place of its own; then runs/<stamp>-drive/ with figures and report.
 
-    out: where the map shall stay. Without, or where it cannot be written there, it is runs/<stamp>-drive.sgrid until
-    the run folder, which holds it too, is whole. Whatever fails, the rest is done, and what is left is in places.
+    recorded: the recording of the drive, where there is one. out: where the map shall stay. Without, or where it cannot
+    be written there, it is runs/<stamp>-drive.sgrid until the run folder, which holds it too, is whole. Whatever fails,
+    the rest is done, and what is left is in places.
     """
     faults: list[str] = []
     kept = _saved_first(mapped, out, runs, faults)
     places = [kept] if kept else []
     scores: list[Score] = []
     try:
-        with run_folder(runs, "drive") as folder:
+        record = RunRecord.of("hardware drive", facts.get("command", ""), recorded)
+        with recorded_run(runs, "drive", record.reading(*config.matcher.files()), config) as folder:
             title = "Map of a drive"
-            scores += write_mapped(folder, mapped, config, source=source, title=title, facts=facts, track=track)
+            # The folder begins when the drive is over.
+            facts = _lasted(mapped) | facts
+            scores += write_mapped(folder, mapped, source=source, title=title, facts=facts, track=track, config=config)
     except Exception as error:  # whatever it is: the drive is over, and cannot be had again
         faults.append(f"{runs}: no run folder: {_told(error)}")
         return Saved(tuple(places), tuple(scores), tuple(faults))
@@ -54,6 +62,13 @@ def save_drive(
         places.remove(kept)
         kept.unlink(missing_ok=True)
     return Saved(tuple(places), tuple(scores), tuple(faults))
+
+
+def _lasted(mapped: Mapped) -> dict[str, str]:
+    """How long was mapped, for the report; nothing where it is not known."""
+    if mapped.stamps_s is None:
+        return {}
+    return {"duration": duration_text(float(mapped.stamps_s[-1] - mapped.stamps_s[0]))}
 
 
 def _saved_first(mapped: Mapped, out: Path | None, runs: Path, faults: list[str]) -> Path | None:

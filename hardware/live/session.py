@@ -97,7 +97,10 @@ class DriveSession:
             if mapped is None:
                 return DriveResult(ended, (*faults, "nothing was mapped"), None, recorded)
             facts = {**facts, "ended": ended, **self._counts()}
-            saved = save_drive(mapped, self._config, self.mapper, runs=runs, out=out, facts=facts, track=track)
+            place = recorder.path if recorder else None
+            saved = save_drive(
+                mapped, self._config, self.mapper, runs=runs, out=out, facts=facts, recorded=place, track=track
+            )
             return DriveResult(ended, (*faults, *saved.faults), saved, recorded)
 
     def _drive(self) -> tuple[str, bool]:

@@ -49,6 +49,19 @@ class Mount:
         x, y, z, yaw, pitch, roll = (float(value) for value in np.round([*T[:3, 3], *turns_deg], 9))
         return cls(x, y, z, pitch, yaw, roll)
 
+    @classmethod
+    def parse(cls, text: str) -> "Mount":
+        """From "x,y,z" or "x,y,z,pitch,yaw,roll" (or fewer), as the commands' --mount has it."""
+        try:
+            numbers = [float(part) for part in text.split(",")]
+            if not 3 <= len(numbers) <= 6:
+                raise ValueError
+        except ValueError:
+            raise InvalidInputError(
+                f"--mount must be x,y,z or x,y,z,pitch,yaw,roll [m, degrees], not {text!r}"
+            ) from None
+        return cls(*numbers)
+
     @property
     def T_base_cam(self) -> FloatArray:
         """(4, 4): from the left rectified optical frame to `base`."""

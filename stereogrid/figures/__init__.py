@@ -9,6 +9,7 @@ from .reliability import reliability_figure
 from .save import figure_png, save_figure
 from .slices import draw_slice, slice_figure, slices_figure
 from .tradeoff import TradeoffPoint, tradeoff_figure
+from .trajectory import trajectory_figure
 
 __all__ = [
     "TradeoffPoint",
@@ -25,4 +26,5 @@ __all__ = [
     "slice_figure",
     "slices_figure",
     "tradeoff_figure",
+    "trajectory_figure",
 ]

@@ -11,6 +11,7 @@ from ..calibration import BoardViews, Residuals, StereoCalibration
 from ..calibration.rig import Both
 from ..geometry import FloatArray
 from ..observation import Image
+from .save import NotebookFigure
 
 BLUE, ORANGE = "#1f4e9c", "#c8651b"
 ARROW_OF_WIDTH = 0.06
@@ -21,7 +22,7 @@ LINES = 16
 def calibration_figure(views: BoardViews, found: Residuals, far: Collection[str] = ()) -> Figure:
     """Both pictures with the errors of all corners and the boards' outlines; below, the difference of rectified rows
     and the error of each pair. far: names of pairs that are drawn apart."""
-    figure = Figure(figsize=(11, 8.2), layout="constrained")
+    figure = NotebookFigure(figsize=(11, 8.2), layout="constrained")
     axes = figure.subplots(2, 2, height_ratios=(1.25, 1))
     longest_px = max(float(np.percentile(np.linalg.norm(off, axis=-1), 98)) for off in found.off_px)
     times = float(f"{ARROW_OF_WIDTH * views.size_px[0] / max(longest_px, 1e-6):.1g}")
@@ -72,7 +73,7 @@ def rectified_figure(calibration: StereoCalibration, pair: tuple[Image, Image], 
     left, right = calibration.rectification().rectify(*pair)
     width, height = calibration.size_px
     points = calibration.rectified_points(*corners)
-    figure = Figure(figsize=(11, 11 * height / (2 * width) + 0.6), layout="constrained")
+    figure = NotebookFigure(figsize=(11, 11 * height / (2 * width) + 0.6), layout="constrained")
     axes = figure.subplots()
     axes.imshow(np.hstack([left, right]), cmap="gray", vmin=0, vmax=255)
     axes.hlines(np.linspace(0, height, LINES + 2)[1:-1], 0, 2 * width - 1, color=ORANGE, linewidth=0.6, alpha=0.8)

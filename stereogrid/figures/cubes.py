@@ -1,4 +1,4 @@
-"""The 3D map as cubes, obstacles in blue, with the camera drawn as a red frustum (the paper's Fig. 9)."""
+"""The 3D map as cubes, obstacles in blue, with the camera drawn as a vermilion frustum (the paper's Fig. 9)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,6 +10,8 @@ from ..camera import StereoCamera
 from ..errors import InvalidInputError
 from ..geometry import Array, FloatArray, inverse, look_at, transform
 from ..grid import OccupancyGrid
+from .colours import PATH_COLOUR
+from .save import NotebookFigure
 
 FACE_NORMALS: Array = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 FACE_SHADES = (0.78, 0.78, 0.62, 0.62, 1.0, 0.5)
@@ -18,7 +20,6 @@ GROUND_COLOUR = (0.86, 0.86, 0.83)
 LOW_COLOUR, HIGH_COLOUR = (0.10, 0.22, 0.58), (0.45, 0.72, 0.98)
 HEIGHTS_M = (-1.5, 1.5)
 """Heights against the camera between which the blue runs from dark to light."""
-FRUSTUM_COLOUR = "#d62728"
 MOST_FACES = 400_000
 
 
@@ -35,19 +36,19 @@ def cubes_figure(
 ) -> Figure:
     """Cells with p > threshold as cubes, seen from behind and above the camera by back_and_up_m.
 
-    path_m (N, 3): the camera's path, a red line; heights are counted from its nearest point, so that a road may
+    path_m (N, 3): the camera's path, a vermilion line; heights are counted from its nearest point, so that a road may
     climb. Cells between heights_m are drawn (a ceiling is cut away with it), those below ground_m in grey.
     T_world_cam (4, 4): where the frustum stands.
     """
     T_eye_world = inverse(eye_behind(T_world_cam, *back_and_up_m))
     centres = grid.occupied_centres()
-    above_m = centres[:, 2] - path_m[KDTree(path_m[:, :2]).query(centres[:, :2])[1], 2]
+    above_m = above_path_m(centres, path_m)
     kept = (above_m >= heights_m[0]) & (above_m <= heights_m[1])
     if not kept.any():
         raise InvalidInputError("the map has no occupied cell in the heights to be drawn")
     cells = np.floor(centres[kept] / grid.cell_m).astype(np.int64)
     polygons, colours = _faces(cells, _colours(above_m[kept], ground_m), grid.cell_m, T_eye_world)
-    figure = Figure(figsize=(9, 5.4), layout="constrained")
+    figure = NotebookFigure(figsize=(9, 5.4), layout="constrained")
     axes = figure.add_subplot()
     axes.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors="face", linewidths=0.15))
     _draw_lines(axes, T_eye_world, np.stack([path_m[:-1], path_m[1:]], axis=1), 1.0)
@@ -56,6 +57,13 @@ def cubes_figure(
     axes.set(xlim=(left, right), ylim=(low, high), aspect="equal", title=title)
     axes.set_axis_off()
     return figure
+
+
+def above_path_m(points_m: FloatArray, path_m: FloatArray) -> FloatArray:
+    """How far points (N, 3) lie above the nearest point (in x and y) of the camera's path (M, 3) [m]."""
+    nearest = KDTree(path_m[:, :2]).query(points_m[:, :2])[1]
+    above_m: FloatArray = points_m[:, 2] - path_m[nearest, 2]
+    return above_m
 
 
 def eye_behind(T_world_cam: FloatArray, back_m: float, up_m: float) -> FloatArray:
@@ -122,8 +130,8 @@ def _colours(above_m: FloatArray, ground_m: float | None) -> FloatArray:
 
 
 def _draw_lines(axes: Axes, T_eye_world: FloatArray, segments_m: FloatArray, width: float) -> None:
-    """Segments (S, 2, 3) in world as red lines; those behind the eye are left out."""
+    """Segments (S, 2, 3) in world as vermilion lines; those behind the eye are left out."""
     seen = transform(T_eye_world, segments_m)
     seen = seen[(seen[:, :, 2] > 0.1).all(axis=1)]
     flat = seen[:, :, :2] / seen[:, :, 2:] * [1, -1]
-    axes.add_collection(LineCollection(list(flat), colors=FRUSTUM_COLOUR, linewidths=width))
+    axes.add_collection(LineCollection(list(flat), colors=PATH_COLOUR, linewidths=width))

@@ -10,6 +10,7 @@ from scipy.special import ndtri
 from ..geometry import FloatArray
 from ..motion import FittedGrowth, MotionFit, Runs
 from ..motion.legs import EXACT, LegsOf
+from .save import NotebookFigure
 
 BAND = float(ndtri(0.975))
 BLUE, ORANGE = "#1f4e9c", "#c8651b"
@@ -55,7 +56,7 @@ def motion_figure(runs: Runs, fit: MotionFit) -> Figure:
     """
     rows = (len(fit.parts) + 1) // 2
     columns = min(len(fit.parts), 2)
-    figure = Figure(figsize=(5.2 * columns, 3.5 * rows + 0.5), layout="constrained")
+    figure = NotebookFigure(figsize=(5.2 * columns, 3.5 * rows + 0.5), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
     for each in axes.flat[len(fit.parts) :]:
         each.remove()

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ..geometry import FloatArray
 from ..observation import FloatImage, Image
+from .colours import SCALE
+from .save import NotebookFigure
 
 Mask = NDArray[np.bool_]
 PANEL_INCHES = 2.7
@@ -57,7 +59,7 @@ def panels_figure(
     height, width = truth_px.shape
     columns = 1 + len(found_px)
     size = (PANEL_INCHES * columns + 0.9, 2 * PANEL_INCHES * height / width + 1.7)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = NotebookFigure(figsize=size, layout="constrained")
     axes = figure.subplots(2, columns)
     largest = float(np.nanmax(truth_px))
     axes[0, 0].imshow(left[..., ::-1] if left.ndim == 3 else left, cmap="gray", vmin=0, vmax=255)
@@ -76,7 +78,7 @@ def panels_figure(
 
 def _draw_disparity(axes: Axes, disparity_px: FloatArray | FloatImage, title: str, largest: float) -> AxesImage:
     axes.set_title(title, fontsize=10)
-    return axes.imshow(disparity_px, cmap="turbo", vmin=0, vmax=largest, interpolation="nearest")
+    return axes.imshow(disparity_px, cmap=SCALE, vmin=0, vmax=largest, interpolation="nearest")
 
 
 def _draw_error(axes: Axes, classes: NDArray[np.uint8]) -> None:

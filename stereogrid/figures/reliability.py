@@ -3,11 +3,12 @@
 from matplotlib.figure import Figure
 
 from ..scoring import ReliabilityTable
+from .save import NotebookFigure
 
 
 def reliability_figure(table: ReliabilityTable, *, title: str = "") -> Figure:
     """Observed frequency of occupied cells over the mean p of each bin, with the counts below."""
-    figure = Figure(figsize=(5.2, 5.6), layout="constrained")
+    figure = NotebookFigure(figsize=(5.2, 5.6), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
     above.plot([0, 1], [0, 1], "--", color="0.6", linewidth=1, label="calibrated")
     full = table.count > 0

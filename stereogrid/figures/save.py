@@ -9,6 +9,14 @@ from matplotlib.figure import Figure
 from ..files import written_beside
 
 DOTS_PER_INCH = 150
+NOTEBOOK_DOTS_PER_INCH = 75
+
+
+class NotebookFigure(Figure):
+    """A Figure that a notebook shows, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        return figure_png(self, NOTEBOOK_DOTS_PER_INCH)
 
 
 def figure_png(figure: Figure, dots_per_inch: int = DOTS_PER_INCH) -> bytes:

@@ -12,10 +12,11 @@ from matplotlib.patches import Patch
 from ..errors import InvalidInputError
 from ..geometry import Array, FloatArray
 from ..grid import OccupancyGrid
+from ..thumbnails import UNKNOWN_RGB
+from .colours import PATH_COLOUR, TRUTH_COLOUR
+from .save import NotebookFigure
 
-UNKNOWN_COLOUR = "#c9d3e3"
-PATH_COLOUR = "#d62728"
-TRUTH_COLOUR = "#2ca02c"
+UNKNOWN_COLOUR = "#{:02x}{:02x}{:02x}".format(*UNKNOWN_RGB)
 LARGEST_CELLS = 4000
 """Pixels along the longer edge; larger maps are sampled more coarsely."""
 
@@ -30,11 +31,11 @@ def slice_figure(
 ) -> Figure:
     """p(occupied) at z = height_m [m] in world: white free, black occupied, blue-grey unknown.
 
-    path_m (N, 3): where the camera went, drawn in red. truth_segments_m (S, 2, 3): the true surfaces' section
+    path_m (N, 3): where the camera went, drawn in vermilion. truth_segments_m (S, 2, 3): the true surfaces' section
     with the plane, in green.
     """
     width_m, depth_m = _span_m(grid, height_m)
-    figure = Figure(figsize=(9, float(np.clip(7.2 * depth_m / width_m, 2.0, 9)) + 1.2), layout="constrained")
+    figure = NotebookFigure(figsize=(9, float(np.clip(7.2 * depth_m / width_m, 2.0, 9)) + 1.2), layout="constrained")
     axes = figure.add_subplot()
     image = draw_slice(axes, grid, height_m)
     figure.colorbar(image, ax=axes, label="p(occupied)", shrink=0.8, aspect=30)
@@ -80,7 +81,7 @@ def _side_by_side(span_m: FloatArray, n: int) -> tuple[Figure, list[Axes]]:
     shape = (n, 1) if long else (1, n)
     each_inches = [9.0, 7.6 * depth_m / width_m + 0.4] if long else [6.0 * width_m / depth_m + 0.5, 6.0]
     size = (each_inches[0] * shape[1] + 0.6, each_inches[1] * shape[0] + 1.0)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = NotebookFigure(figsize=size, layout="constrained")
     return figure, list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel())
 
 
@@ -117,7 +118,11 @@ def _sample(grid: OccupancyGrid, height_m: float) -> tuple[FloatArray, FloatArra
     """Cell centres x (X,), y (Y,) [m] of the known part of the slice and p (X, Y), NaN = unknown."""
     layer = grid.known_layer(height_m)
     if not len(layer):
-        raise InvalidInputError(f"the map knows no cell at z = {height_m:.2f} m, so there is no slice to draw")
+        k = grid.known_cells()[0][:, 2]
+        ends_m = f"from {k.min() * grid.cell_m:.2f} to {(k.max() + 1) * grid.cell_m:.2f} m" if len(k) else "none at all"
+        raise InvalidInputError(
+            f"the map knows no cell at z = {height_m:.2f} m, so there is no slice to draw; its cells: {ends_m}"
+        )
     low, high = layer.min(axis=0) - 1, layer.max(axis=0) + 2
     stride = int(np.ceil((high - low).max() / LARGEST_CELLS))
     x, y = ((np.arange(a, b, stride) + 0.5) * grid.cell_m for a, b in zip(low, high, strict=True))

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from .save import NotebookFigure
+
 MARKERS = "os^DvPX*"
 ROOM_FOR_FIVES = 2000.0
 """An axis that spans more has labels at powers of ten alone."""
@@ -39,7 +41,7 @@ def tradeoff_figure(points: Sequence[TradeoffPoint], *, cost: str, quality: str,
     markers = {method: MARKERS[n % len(MARKERS)] for n, method in enumerate(methods)}
     colours = {scene: colormaps["tab10"](n % 10) for n, scene in enumerate(scenes)}
     handles = [Line2D([], [], color="0.3", marker=markers[m], linestyle="", label=m) for m in methods]
-    figure = Figure(figsize=(7.5, 4.8), layout="constrained")
+    figure = NotebookFigure(figsize=(7.5, 4.8), layout="constrained")
     axes = figure.add_subplot(xlabel=cost, ylabel=quality)
     if len(scenes) > 1:
         for scene in scenes:

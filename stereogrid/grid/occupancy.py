@@ -14,6 +14,7 @@ from ..errors import InvalidInputError, MapTooLargeError, unknown_name
 from ..geometry import Array, FloatArray
 from ..observation import Disparity
 from ..sensor_model import SensorModel, log_odds, probability
+from ..thumbnails import layer_picture, shown
 from .blocks import BlockStore
 from .cells import DEFAULT_CLAMP, LogOddsCells
 from .fusion import FUSIONS, Learnt, View, default_threads
@@ -69,6 +70,19 @@ class OccupancyGrid(MapQueries):
             f"OccupancyGrid(cell_m={self.cell_m}, {len(self.blocks)} blocks, {self.n_known:,} known cells, "
             f"{self.n_bytes / 1e6:.1f} MB)"
         )
+
+    def _repr_html_(self) -> str:
+        cells, p = self.known_cells()
+        if not len(cells):
+            return shown(repr(self))
+        k = np.bincount(cells[:, 2] - cells[:, 2].min()).argmax() + cells[:, 2].min()
+        layer = cells[:, 2] == k
+        size_m = (np.ptp(cells[layer, :2], axis=0) + 1) * self.cell_m
+        caption = (
+            f"slice at z = {(k + 0.5) * self.cell_m:.2f} m, {size_m[0]:.2f} x {size_m[1]:.2f} m, x to the right: white "
+            "free, black occupied, blue-grey unknown"
+        )
+        return shown(repr(self), layer_picture(cells[layer, :2], p[layer]), caption)
 
     def check_fits(self, camera: StereoCamera) -> None:
         """Raise MapTooLargeError, naming the need, when one view of this camera would not fit in the limit."""

@@ -1,10 +1,12 @@
 """How a robot's motion error grows with the way, as repeated runs tell: eps of Eq. 13, and the ways to use it."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
-from ..errors import InvalidInputError, unknown_name
+from ..described import Doc, check_fields
+from ..errors import unknown_name
 from ..observation import Odometry
 
 WAYS = ("none", "linear", "rss", "pose", "submaps")
@@ -20,17 +22,20 @@ are mapped as if poses were exact, and then laid into the map wherever they may 
 class Growth:
     """A variance that grows with a length d: a d + (b d)^2.
 
-    a: what each part of the way adds anew (random slip). b: what a run keeps from its start to its end (a wrong scale).
     Both terms are needed (the paper's "repetitive experiments" are the runs that tell them apart).
     """
 
-    a: float = 0.0
-    b: float = 0.0
+    a: Annotated[
+        float,
+        Doc("What each part of the way adds anew (random slip).", "the error's unit^2 / the way's unit", least=0),
+    ] = 0.0
+    b: Annotated[
+        float,
+        Doc("What a run keeps from start to end (a wrong scale).", "the error's unit / the way's unit", least=0),
+    ] = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0):
-                raise InvalidInputError(f"{name} must be >= 0 and finite, not {value}")
+        check_fields(self)
 
     def sigma(self, length: float) -> float:
         """The standard deviation after that length."""
@@ -39,31 +44,44 @@ class Growth:
 
 @dataclass(frozen=True)
 class MotionError:
-    """What is wrong with a pose that odometry tells, since the pose was last certain.
+    """What is wrong with a pose that odometry tells, since the pose was last certain. All errors zero: poses are exact.
 
-    along [m], across [m] the heading, and heading [rad]: growing with the distance travelled [m]; across is what the
-    heading's own error does not explain. turn [rad]: of the heading, growing with the angle turned [rad].
-    position_m, heading_rad: what each pose errs by anew and that does not grow, as of a robot that is tracked from
-    outside. kappa: 1 for standard deviations, as disparity sigmas are. way: one of WAYS. submap_m: length of the pieces
-    of the way "submaps" [m]. All errors zero: poses are exact.
+    position_m and heading_rad do not grow, as of a robot that is tracked from outside; across is what the heading's own
+    error does not explain.
     """
 
-    way: str = "rss"
-    kappa: float = 1.0
-    submap_m: float = 2.0
-    position_m: float = 0.0
-    heading_rad: float = 0.0
-    along: Growth = field(default_factory=Growth)
-    across: Growth = field(default_factory=Growth)
-    heading: Growth = field(default_factory=Growth)
-    turn: Growth = field(default_factory=Growth)
+    way: Annotated[
+        str,
+        Doc(
+            "What a map makes of the error. none: poses are taken as exact; linear: it widens every reading, as the "
+            "paper has it; rss: the same, as independent errors add; pose: the covariance of each pose; submaps: "
+            "pieces of the drive, laid wherever they may lie.",
+            choices=WAYS,
+        ),
+    ] = "rss"
+    kappa: Annotated[float, Doc("So many standard deviations; 1, as disparity sigmas are.", "1", least=0)] = 1.0
+    submap_m: Annotated[float, Doc("Length of the pieces of the way submaps.", "m", least=0)] = 2.0
+    position_m: Annotated[
+        float, Doc("What each position errs by anew, and that does not grow: standard deviation.", "m", least=0)
+    ] = 0.0
+    heading_rad: Annotated[float, Doc("The same of each heading.", "rad", least=0)] = 0.0
+    along: Annotated[
+        Growth, Doc("Error along the heading [m], growing with the distance d travelled [m]: variance a d + (b d)^2.")
+    ] = field(default_factory=Growth)
+    across: Annotated[Growth, Doc("Error across it [m], growing with the distance travelled [m].")] = field(
+        default_factory=Growth
+    )
+    heading: Annotated[Growth, Doc("Error of the heading [rad], growing with the distance travelled [m].")] = field(
+        default_factory=Growth
+    )
+    turn: Annotated[Growth, Doc("Error of the heading [rad], growing with the angle turned [rad].")] = field(
+        default_factory=Growth
+    )
 
     def __post_init__(self) -> None:
         if self.way not in WAYS:
             raise unknown_name("way to use the motion error", self.way, WAYS)
-        for name in ("kappa", "submap_m", "position_m", "heading_rad"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InvalidInputError(f"{name} must be >= 0 and finite, not {getattr(self, name)}")
+        check_fields(self)
 
     def sigma_m(self, odometry: Odometry) -> float:
         """eps [m] of Eq. 13 at this reading: the error along the way, kappa sqrt(position^2 + a d + b^2 d^2)."""

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
-from ..errors import InvalidInputError
+from ..described import Doc, check_fields
 from ..geometry import FloatArray, from_yaw, inverse, yaw_rad
 from ..observation import Observation, Odometry, Recording
 from .error import MotionError
@@ -32,15 +32,13 @@ class OdometryNoise:
     After Thrun, Burgard and Fox, Probabilistic Robotics, section 5.4 (whose variances are of one step).
     """
 
-    rotation_per_rad: float = 0.0
-    rotation_per_m: float = 0.0
-    translation_per_m: float = 0.0
-    translation_per_rad: float = 0.0
+    rotation_per_rad: Annotated[float, Doc("Variance of the turn for each radian turned.", "rad^2/rad", least=0)] = 0.0
+    rotation_per_m: Annotated[float, Doc("Variance of the turn for each metre of path.", "rad^2/m", least=0)] = 0.0
+    translation_per_m: Annotated[float, Doc("Variance of the path for each metre of it.", "m^2/m", least=0)] = 0.0
+    translation_per_rad: Annotated[float, Doc("Variance of the path for each radian turned.", "m^2/rad", least=0)] = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value >= 0):
-                raise InvalidInputError(f"{name} must be >= 0 and finite, not {value}")
+        check_fields(self)
 
     def walk(self, T_odom_base: FloatArray, rng: np.random.Generator) -> Walk:
         """One run from T_odom_base (4, 4)."""

@@ -1,6 +1,7 @@
 """Sequences in the layout of KITTI odometry: two folders of rectified images, calib.txt and poses.txt."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,9 @@ import numpy as np
 from ..camera import StereoCamera
 from ..errors import InvalidInputError, RecordingError
 from ..geometry import R_BASE_OPTICAL, FloatArray, from_rotation, inverse
-from ..observation import Image, Observation
-from .images import decode_grey
+from ..observation import Observation
+from .file_recording import FileRecording, ObservationAt
+from .images import picture_size, read_grey
 from .kitti_files import image_names, projections, read_poses, read_stamps
 from .track import odometry_track
 
@@ -17,7 +19,7 @@ LAYOUTS = (("image_0", "image_1", 0), ("image_2", "image_3", 2), ("image_l", "im
 """Left folder, right folder, number of the left camera in calib.txt; the first found is read."""
 
 
-class KittiRecording:
+class KittiRecording(FileRecording):
     """The pairs of a KITTI-odometry folder, images read as they are asked for.
 
     poses: the file of poses; else poses.txt in the folder, else the benchmark's ../../poses/<name>.txt.
@@ -35,32 +37,28 @@ class KittiRecording:
         left, right, row = _layout(self.path)
         names = image_names(self.path / left, self.path / right)
         self._pairs = [(self.path / left / name, self.path / right / name) for name in names]
-        self._stamps_s = read_stamps(self.path / "times.txt", len(names))
+        self.metadata, self.left_out = {}, {}
+        self.stamps_s = np.array(read_stamps(self.path / "times.txt", len(names)))
         P_left, P_right = projections(self.path / "calib.txt", row)
-        height_px, width_px = _read(self._pairs[0][0]).shape
+        height_px, width_px = picture_size(self._pairs[0][0])
         try:
             self.camera = StereoCamera.from_projections(P_left, P_right, (width_px, height_px))
         except InvalidInputError as error:
             raise RecordingError(f"{self.path / 'calib.txt'}: {error}") from error
-        T_first_left = _file_poses(self.path, poses, len(names)) @ _T_reference_left(self.camera, P_left)
+        self.beside = (_poses_file(self.path, poses),)
+        T_first_left = read_poses(self.beside[0], len(names)) @ T_reference_left(self.camera, P_left)
         self.T_base_cam = from_rotation(R_BASE_OPTICAL)
-        self.poses: FloatArray = self.T_base_cam @ inverse(T_first_left[0]) @ T_first_left
+        self.poses = self.T_base_cam @ inverse(T_first_left[0]) @ T_first_left
         self._odometry = odometry_track(self.poses @ inverse(self.T_base_cam))
 
-    def __len__(self) -> int:
-        return len(self._pairs)
+    @contextmanager
+    def _reading(self) -> Iterator[ObservationAt]:
+        yield self._observation
 
-    def __iter__(self) -> Iterator[Observation]:
-        for number, pair in enumerate(self._pairs):
-            left, right = (self._image(path) for path in pair)
-            yield Observation(self._stamps_s[number], left, right, self._odometry[number], self.poses[number])
-
-    def _image(self, path: Path) -> Image:
-        image = _read(path)
-        if image.shape != self.camera.shape:
-            first = self._pairs[0][0]
-            raise RecordingError(f"{path}: the image is {image.shape}, expected {self.camera.shape} as {first}")
-        return image
+    def _observation(self, number: int) -> Observation:
+        first = self._pairs[0][0]
+        left, right = (read_grey(path, self.camera.shape, first) for path in self._pairs[number])
+        return Observation(float(self.stamps_s[number]), left, right, self._odometry[number], self.poses[number])
 
 
 def is_kitti(path: Path) -> bool:
@@ -81,24 +79,20 @@ def _layout(folder: Path) -> tuple[str, str, int]:
     raise RecordingError(f"{folder}: no folders of images; expected one pair of {expected}")
 
 
-def _file_poses(folder: Path, given: str | Path | None, n_images: int) -> FloatArray:
+def _poses_file(folder: Path, given: str | Path | None) -> Path:
     beside = folder.resolve().parent.parent / "poses" / f"{folder.resolve().name}.txt"
     places = [Path(given)] if given is not None else [folder / "poses.txt", beside]
     for place in places:
         if place.is_file():
-            return read_poses(place, n_images)
+            return place
     raise RecordingError(f"{places[0]}: no such file; poses are needed, one row an image")
 
 
-def _T_reference_left(camera: StereoCamera, P_left: FloatArray) -> FloatArray:
-    # The poses are camera 0's; the left colour camera stands a few centimetres beside it.
+def T_reference_left(camera: StereoCamera, P_left: FloatArray) -> FloatArray:
+    """The left camera (4, 4) as seen from the reference, camera 0, which poses and calibrations are of.
+
+    The left colour camera stands a few centimetres beside it, as the fourth column of its projection P_left tells.
+    """
     x, y, z = P_left[:, 3]
     centre = [-(x - camera.cx_px * z) / camera.focal_px, -(y - camera.cy_px * z) / camera.focal_px, -z]
     return from_rotation(np.eye(3), centre)
-
-
-def _read(path: Path) -> Image:
-    try:
-        return decode_grey(path.read_bytes(), str(path))
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error

@@ -1,35 +1,17 @@
 """Finds what an MCAP file holds, as far as it can be read."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema, Statistics
-from mcap.stream_reader import StreamReader, breakup_chunk
-from mcap.writer import MCAP0_MAGIC
+from mcap.records import Attachment, Channel, McapRecord, Message, Metadata, Schema, Statistics
 
 from ..errors import InvalidInputError, RecordingError
-from . import ros2_messages as ros2
-
-UNSTAMPED = 3
-"""So many messages of one topic with one header stamp, written at different times, have a driver that sets none."""
-TRANSFORMS = "tf2_msgs/msg/TFMessage"
-LAST_STAMP_NS = 2**63 - 1
-MAX_CHUNK_BYTES = 2**28
-"""No chunk of ours comes near; a damaged or hostile one may claim to unpack to anything."""
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is wanted of a topic: messages of one of these types; `keep` makes of one, decoded, what is held in memory.
-
-    once: only of the first one. Without `keep` no more is kept than where each message lies.
-    """
-
-    types: tuple[str, ...]
-    keep: Callable[[Any], Any] | None = None
-    once: bool = False
+from .contents import Collector, Contents, Wanted
+from .mcap_file import ClippedFile, Records
 
 
 @dataclass(frozen=True)
@@ -40,184 +22,125 @@ class Location:
     number: int
 
 
-@dataclass
-class Contents:
-    """What a scan found of what was wanted. messages: topic -> header stamp [ns] -> place; small: what was kept of
-    them, by the same keys; types: the type of each topic's messages, whether wanted or not.
-
-    unstamped: topics all of whose messages have one and the same header stamp; the keys are then the times at which
-    they were written to the file (log_time). repeats: by topic, how many messages have the stamp of an earlier one, and
-    are not here. damage says what ended the reading early, None for a file that reads to its end.
-    """
-
-    messages: dict[str, dict[int, Location]] = field(default_factory=dict)
-    small: dict[str, dict[int, Any]] = field(default_factory=dict)
-    types: dict[str, str] = field(default_factory=dict)
-    static_transforms: list[Any] = field(default_factory=list)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    attachments: dict[str, int] = field(default_factory=dict)
-    unstamped: set[str] = field(default_factory=set)
-    repeats: dict[str, int] = field(default_factory=dict)
-    damage: str | None = None
+MessageAt = Callable[[Location], Message]
 
 
-def scan(path: Path, wanted: Mapping[str, Wanted]) -> Contents:
-    """Read the whole file once, keeping places and small messages of the topics wanted; stop at the first damage.
+@contextmanager
+def messages_of(path: Path) -> Iterator[MessageAt]:
+    """Open a file to read messages by the places that a scan gave them."""
+    with ClippedFile(path) as file:
+        # Many messages may lie in one chunk: unpack it once for all that are near.
+        records_at = lru_cache(maxsize=4)(file.records_at)
 
-    Every chunk's checksum is checked here, so what was found can be read later.
+        def message_at(place: Location) -> Message:
+            record = records_at(place.offset)[place.number]
+            if not isinstance(record, Message):
+                raise InvalidInputError("the file changed since it was opened")
+            return record
+
+        yield message_at
+
+
+def scan(path: Path, wanted: Mapping[str, Wanted], by_type: Mapping[str, Wanted] | None = None) -> Contents:
+    """Read the whole file once, keeping places (Location) and small messages of the topics wanted; over damage
+    (Records).
+
+    by_type: what is wanted of topics that `wanted` does not name.
     Raises RecordingError when the file cannot be opened or is no MCAP file.
     """
+    collector = Collector(wanted, by_type)
+    collector.contents.damage = scan_into(collector, path)
+    collector.finish()
+    return collector.contents
+
+
+def scan_into(
+    collector: Collector,
+    path: Path,
+    place: Callable[[Location], Any] = lambda at: at,
+    unpack: Callable[[bytes], bytes] = bytes,
+) -> str | None:
+    """Hand a file's messages to a collector; what could not be read, in a line, None for a file that is whole.
+
+    place: what to make of where each lies; unpack: of a message's bytes.
+    Raises RecordingError as `scan` does.
+    """
     with ClippedFile(path) as file:
-        reader = _Scanner(file, wanted)
-        try:
-            reader.run()
-        except Exception as error:
-            # The mcap library raises whatever its parsers stumble on: struct, Unicode, zstd, memory errors.
-            if not reader.started:
-                raise RecordingError(f"{path}: not an MCAP file, or cut off in its first bytes") from error
-            what = str(error) or type(error).__name__
-            reader.contents.damage = f"damaged or cut off at byte {reader.offset}: {what}"
-    reader.use_log_times()
-    return reader.contents
+        records = Records(file, path)
+        scanner = _Scanner(collector, place, unpack)
+        for offset, found in records:
+            scanner.take(offset, found)
+        if records.is_empty:
+            raise RecordingError(f"{path}: not an MCAP file, or cut off in its first bytes")
+    return _damage([*records.damages, *scanner.faults], scanner.n_messages, scanner.n_written)
+
+
+def _damage(faults: list[str], n_found: int, n_written: int | None) -> str | None:
+    """What could not be read, in one line."""
+    if n_written is not None and n_found != n_written and not faults:
+        return f"{n_found} messages found where {n_written} were written"
+    if not faults:
+        return None
+    places = f" and in {len(faults) - 1} more places" if len(faults) > 1 else ""
+    lost = "" if n_written is None else f"; {max(n_written - n_found, 0)} of {n_written} messages are lost"
+    return f"damaged or cut off at {faults[0]}{places}{lost}"
 
 
 class _Scanner:
-    def __init__(self, file: "ClippedFile", wanted: Mapping[str, Wanted]) -> None:
-        self.contents = Contents()
-        self.started = False
-        self.offset = 0
-        self._file = file
-        self._wanted = wanted
+    """n_messages: found; n_written: how many the file says that it has, None where it does not get to say so.
+
+    faults: records that say what no record can, in words.
+    """
+
+    def __init__(
+        self, collector: Collector, place: Callable[[Location], Any], unpack: Callable[[bytes], bytes]
+    ) -> None:
+        self.n_messages = 0
+        self.n_written: int | None = None
+        self.faults: list[str] = []
+        self._collector, self._place, self._unpack = collector, place, unpack
         self._topics: dict[int, str] = {}
+        self._wanted: set[int] = set()
         self._schema_names: dict[int, str] = {}
-        self._n_messages = 0
-        self._stamp = ros2.decoder("std_msgs/msg/Header")
-        # By the time of writing, of topics that have had but one header stamp so far.
-        self._logged = Contents()
 
-    def run(self) -> None:
-        for record in _stream_reader(self._file).records:
-            self.started = True
-            self._take(record)
-            self.offset = self._file.tell()
+    def take(self, offset: int, records: list[McapRecord]) -> None:
+        """Take the record at an offset, or those of the chunk there; what cannot be decoded is a fault."""
+        for number, record in enumerate(records):
+            self._try(record, Location(offset, number))
 
-    def use_log_times(self) -> None:
-        """At the end: for topics whose header stamps say nothing."""
-        contents = self.contents
-        for topic, places in self._logged.messages.items():
-            if len(places) >= UNSTAMPED:
-                contents.messages[topic], contents.small[topic] = places, self._logged.small.get(topic, {})
-                contents.unstamped.add(topic)
-                contents.repeats[topic] -= len(places) - 1
+    def _try(self, record: McapRecord, location: Location) -> None:
+        try:
+            self._take(record, location)
+        except Exception as error:
+            # Decoders of foreign bytes raise whatever they stumble on.
+            self.faults.append(f"byte {location.offset}: {str(error) or type(error).__name__}")
 
-    def _take(self, record: McapRecord) -> None:
-        contents = self.contents
-        if isinstance(record, Chunk):
-            for number, inner in enumerate(open_chunk(record)):
-                self._take_data(inner, Location(self.offset, number))
+    def _take(self, record: McapRecord, location: Location) -> None:
+        contents = self._collector.contents
+        if isinstance(record, Message):
+            self._take_message(record, location)
+            self.n_messages += 1
+        elif isinstance(record, Schema):
+            self._schema_names[record.id] = record.name
+        elif isinstance(record, Channel):
+            self._take_channel(record)
         elif isinstance(record, Metadata):
             contents.metadata.setdefault(record.name, {}).update(record.metadata)
         elif isinstance(record, Attachment):
-            contents.attachments[record.name] = self.offset
-        elif isinstance(record, Statistics) and record.message_count != self._n_messages:
-            raise InvalidInputError(f"{self._n_messages} messages found where {record.message_count} were written")
-        else:
-            self._take_data(record, Location(self.offset, 0))
+            contents.attachments[record.name] = location.offset
+        elif isinstance(record, Statistics):
+            self.n_written = record.message_count
 
-    def _take_data(self, record: McapRecord, location: Location) -> None:
-        if isinstance(record, Schema):
-            self._schema_names[record.id] = record.name
-        elif isinstance(record, Channel):
-            type_name = self._schema_names.get(record.schema_id, "")
-            first = self.contents.types.setdefault(record.topic, type_name)
-            wanted = self._wanted.get(record.topic)
-            if wanted and record.message_encoding == "cdr" and type_name == first and type_name in wanted.types:
-                self._topics[record.id] = record.topic
-        elif isinstance(record, Message):
-            self._n_messages += 1
-            if record.channel_id in self._topics:
-                self._take_message(self._topics[record.channel_id], record, location)
+    def _take_channel(self, channel: Channel) -> None:
+        self._topics[channel.id] = channel.topic
+        self._wanted.discard(channel.id)
+        wanted = self._collector.wants(channel.topic, self._schema_names.get(channel.schema_id, ""))
+        if wanted and channel.message_encoding == "cdr":
+            self._wanted.add(channel.id)
 
-    def _take_message(self, topic: str, message: Message, location: Location) -> None:
-        data = message.data
-        type_name = self.contents.types[topic]
-        if type_name == TRANSFORMS:
-            # It has no header of its own.
-            transforms = ros2.decoder(type_name)(data).transforms
-            if topic == ros2.TF_STATIC:
-                self.contents.static_transforms.extend(transforms)
-            if topic == ros2.TF_STATIC or not transforms:
-                return
-            stamp_ns = ros2.header_stamp_ns(transforms[0].header)
-        else:
-            stamp_ns = ros2.header_stamp_ns(self._stamp(data))
-        self._keep(self.contents, topic, stamp_ns, data, location)
-        if len(self.contents.messages[topic]) > 1:
-            self._logged.messages.pop(topic, None)
-            self._logged.small.pop(topic, None)
-        else:
-            self._keep(self._logged, topic, min(message.log_time, LAST_STAMP_NS), data, location)
-
-    def _keep(self, held: Contents, topic: str, stamp_ns: int, data: bytes, location: Location) -> None:
-        places, wanted = held.messages.setdefault(topic, {}), self._wanted[topic]
-        if stamp_ns in places:
-            held.repeats[topic] = held.repeats.get(topic, 0) + 1
-            return
-        if wanted.keep is not None and not (wanted.once and held.small.get(topic)):
-            decoded = ros2.decoder(self.contents.types[topic])(data)
-            held.small.setdefault(topic, {})[stamp_ns] = wanted.keep(decoded)
-        places[stamp_ns] = location
-
-
-class ClippedFile:
-    """A file that never reads past its end, so that a damaged length cannot ask for gigabytes of memory."""
-
-    def __init__(self, path: Path) -> None:
-        try:
-            self._file = path.open("rb")
-            self.size = path.stat().st_size
-        except OSError as error:
-            raise RecordingError(f"{path}: cannot be read: {error.strerror}") from error
-
-    def read(self, n_bytes: int) -> bytes:
-        """At most n_bytes bytes, fewer at the end of the file."""
-        if n_bytes < 0:
-            raise ValueError("a record of negative length")
-        return self._file.read(min(n_bytes, self.size - self._file.tell()))
-
-    def tell(self) -> int:
-        """Offset of the next byte."""
-        return self._file.tell()
-
-    def records_at(self, offset: int) -> list[McapRecord]:
-        """The record at an offset found by `scan`, or those in it when it is a chunk."""
-        self._file.seek(offset)
-        record = next(_stream_reader(self, skip_magic=True).records)
-        return open_chunk(record) if isinstance(record, Chunk) else [record]
-
-    def __enter__(self) -> "ClippedFile":
-        return self
-
-    def __exit__(self, *exc_info: object) -> None:
-        self._file.close()
-
-
-def _stream_reader(file: ClippedFile, *, skip_magic: bool = False) -> StreamReader:
-    # It needs only `read`, whatever its annotation says.
-    stream = cast("IO[bytes]", file)
-    return StreamReader(stream, skip_magic=skip_magic, emit_chunks=True, record_size_limit=file.size)
-
-
-def open_chunk(chunk: Chunk) -> list[McapRecord]:
-    """The records in a chunk, its checksum verified. Raises whatever the mcap library raises."""
-    if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-        raise InvalidInputError(f"a chunk claims to unpack to {chunk.uncompressed_size} bytes")
-    return breakup_chunk(chunk, validate_crc=True)
-
-
-def is_mcap(path: Path) -> bool:
-    """True for a file that is named *.mcap or begins as MCAP files do."""
-    if not path.is_file():
-        return False
-    with ClippedFile(path) as file:
-        return path.suffix.lower() == ".mcap" or file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+    def _take_message(self, message: Message, location: Location) -> None:
+        topic = self._topics.get(message.channel_id)
+        if topic is not None:
+            self._collector.count(topic)
+        if topic is not None and message.channel_id in self._wanted:
+            self._collector.take(topic, message.log_time, self._unpack(message.data), self._place(location))

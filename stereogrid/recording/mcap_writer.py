@@ -4,9 +4,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
-from ..geometry import FloatArray, as_pose
+from ..geometry import FloatArray, as_pose, inverse
 from ..observation import Observation
 from . import ros2_messages as ros2
 from .ros2_file import Ros2File
@@ -77,7 +79,7 @@ class McapWriter:
         """
         stamp_ns = self._checked_stamp_ns(observation)
         if self._last_stamp_ns is None:
-            self._file.write(ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self.T_base_cam))
+            self._file.write(ros2.TF_STATIC, stamp_ns, self._standing(stamp_ns))
         # The right image comes last: an observation that has it is whole.
         for topic, message in self._messages(stamp_ns, observation):
             self._file.write(topic, stamp_ns, message)
@@ -96,10 +98,31 @@ class McapWriter:
     ) -> None:
         self.close()
 
+    def _standing(self, stamp_ns: int) -> ros2.Message:
+        """What stands still in the tree of frames: world - odom - base_link - cameras, and world - the true base_link.
+
+        The recording claims that odom is world; how far it drifts is how far base_link is from the true one.
+        """
+        return ros2.static_transform_message(
+            stamp_ns,
+            self.T_base_cam,
+            ros2.right_camera(self.camera.baseline_m),
+            (ros2.WORLD_FRAME, ros2.ODOM_FRAME, np.eye(4)),
+            (ros2.TRUE_BASE_FRAME, ros2.TRUE_CAMERA_FRAME, self.T_base_cam),
+        )
+
+    def _moving(self, stamp_ns: int, observation: Observation) -> ros2.Message:
+        transforms: list[ros2.Transform] = [(ros2.ODOM_FRAME, ros2.BASE_FRAME, observation.odometry.T_odom_base)]
+        if observation.truth is not None:
+            T_world_base = observation.truth.T_world_cam @ inverse(self.T_base_cam)
+            transforms.append((ros2.WORLD_FRAME, ros2.TRUE_BASE_FRAME, T_world_base))
+        return ros2.transforms_message(stamp_ns, transforms)
+
     def _messages(self, stamp_ns: int, observation: Observation) -> Iterator[tuple[str, ros2.Message]]:
         yield ros2.LEFT_INFO, ros2.camera_info_message(stamp_ns, self.camera, right=False)
         yield ros2.RIGHT_INFO, ros2.camera_info_message(stamp_ns, self.camera, right=True)
         yield ros2.ODOMETRY, ros2.odometry_message(stamp_ns, observation.odometry.T_odom_base)
+        yield ros2.TF, self._moving(stamp_ns, observation)
         truth = observation.truth
         if truth is not None:
             yield ros2.TRUE_POSE, ros2.true_pose_message(stamp_ns, truth.T_world_cam)
@@ -108,7 +131,7 @@ class McapWriter:
             if truth.depth_m is not None:
                 yield ros2.TRUE_DEPTH, ros2.depth_message(stamp_ns, truth.depth_m)
         yield ros2.LEFT_IMAGE, ros2.image_message(stamp_ns, observation.left)
-        yield ros2.RIGHT_IMAGE, ros2.image_message(stamp_ns, observation.right)
+        yield ros2.RIGHT_IMAGE, ros2.image_message(stamp_ns, observation.right, right=True)
 
     def _checked_stamp_ns(self, observation: Observation) -> int:
         truth = observation.truth
@@ -127,3 +150,9 @@ class McapWriter:
 def mover_mesh_name(name: str) -> str:
     """What the mesh of a mover is called among the file's attachments."""
     return f"mover/{name}.ply"
+
+
+def mover_of_mesh(attachment: str) -> str:
+    """The mover whose mesh an attachment of this name is; "" for another attachment."""
+    name = attachment.removeprefix("mover/").removesuffix(".ply")
+    return name if attachment == mover_mesh_name(name) else ""

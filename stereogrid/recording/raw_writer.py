@@ -8,9 +8,9 @@ from types import TracebackType
 import numpy as np
 
 from ..calibration import StereoCalibration
-from ..camera import StereoCamera
+from ..camera import Rectification, StereoCamera
 from ..errors import InvalidInputError
-from ..geometry import FloatArray, as_floats, as_pose
+from ..geometry import FloatArray, as_pose
 from ..observation import Image, check_pair
 from . import ros2_messages as ros2
 from . import ros2_raw as raw
@@ -56,7 +56,7 @@ class RawWriter:
     def __init__(
         self,
         path: str | Path,
-        rig: StereoCalibration | StereoCamera | None,
+        rig: StereoCalibration | Rectification | StereoCamera | None,
         T_base_cam: FloatArray | None,
         *,
         metadata: Mapping[str, str] | None = None,
@@ -64,6 +64,7 @@ class RawWriter:
     ) -> None:
         self.path = Path(path)
         self._cameras = None if rig is None else camera_matrices(rig)
+        self._baseline_m = None if self._cameras is None else _baseline_m(self._cameras[1])
         self._T_base_cam = None if T_base_cam is None else as_pose(T_base_cam, "T_base_cam")
         texts = {raw.KIND: raw.RAW, **(metadata or {})}
         self._file = Ros2File(path, raw.TOPICS, metadata=texts, grouped=True, overwrite=overwrite)
@@ -85,10 +86,11 @@ class RawWriter:
             raise InvalidInputError(f"the pictures are of {size_px} px, the calibration of {self._cameras[0].size_px}")
         stamps_ns = [ros2.stamp_to_ns(stamp_s) for stamp_s in (left_stamp_s, right_stamp_s)]
         self._place_camera(stamps_ns[0])
-        for topic, camera, stamp_ns in zip(_INFOS, self._cameras or (), stamps_ns, strict=False):
-            self._file.write(topic, stamp_ns, raw.camera_info_message(stamp_ns, camera))
-        for topic, image, stamp_ns in zip(_IMAGES, (left, right), stamps_ns, strict=True):
-            self._file.write(topic, stamp_ns, ros2.image_message(stamp_ns, image))
+        for side, (camera, stamp_ns) in enumerate(zip(self._cameras or (), stamps_ns, strict=False)):
+            info = raw.camera_info_message(stamp_ns, camera, right=bool(side))
+            self._file.write(_INFOS[side], stamp_ns, info)
+        for side, (image, stamp_ns) in enumerate(zip((left, right), stamps_ns, strict=True)):
+            self._file.write(_IMAGES[side], stamp_ns, ros2.image_message(stamp_ns, image, right=bool(side)))
         self._file.flush()
 
     def write_report(self, report: RawReport) -> None:
@@ -99,6 +101,8 @@ class RawWriter:
         self._file.write(
             ros2.ODOMETRY, stamp_ns, raw.odometry_message(stamp_ns, report.T_odom_base, twist, report.odometry_lost)
         )
+        moved = raw.odometry_frame(report.odometry_lost), ros2.BASE_FRAME, report.T_odom_base
+        self._file.write(ros2.TF, stamp_ns, ros2.transforms_message(stamp_ns, [moved]))
         if report.battery_v is not None:
             self._file.write(raw.BATTERY, stamp_ns, raw.battery_message(stamp_ns, report.battery_v))
         for number, range_m in report.sonar_m.items():
@@ -130,20 +134,26 @@ class RawWriter:
     def _place_camera(self, stamp_ns: int) -> None:
         """Once, with the first message."""
         if self._T_base_cam is not None:
-            self._file.write(ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, self._T_base_cam))
+            others = () if self._baseline_m is None else (ros2.right_camera(self._baseline_m),)
+            message = ros2.static_transform_message(stamp_ns, self._T_base_cam, *others)
+            self._file.write(ros2.TF_STATIC, stamp_ns, message)
             self._T_base_cam = None
 
 
-def camera_matrices(rig: StereoCalibration | StereoCamera) -> tuple[raw.CameraMatrices, raw.CameraMatrices]:
+def camera_matrices(
+    rig: StereoCalibration | Rectification | StereoCamera,
+) -> tuple[raw.CameraMatrices, raw.CameraMatrices]:
     """What ROS calls K, D, R and P of the left and the right camera of a rig."""
     if isinstance(rig, StereoCamera):
         size_px = rig.width_px, rig.height_px
         left, right = (raw.CameraMatrices(rig.K, np.zeros(5), np.eye(3), P, size_px) for P in rig.P)
         return left, right
-    rectification = rig.rectification()
-    turns = rectification.R_rect_left, rectification.R_rect_left @ rig.T_right_left[:3, :3].T
+    told = (rig if isinstance(rig, Rectification) else rig.rectification()).matrices
     left, right = (
-        raw.CameraMatrices(as_floats(K), as_floats(distortion), R, P, rig.size_px)
-        for K, distortion, R, P in zip(rig.K, rig.distortion, turns, rectification.camera.P, strict=True)
+        raw.CameraMatrices(*each, told.size_px) for each in zip(told.K, told.distortion, told.R, told.P, strict=True)
     )
     return left, right
+
+
+def _baseline_m(right: raw.CameraMatrices) -> float:
+    return float(-right.P[0, 3] / right.P[0, 0])

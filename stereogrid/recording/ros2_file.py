@@ -2,22 +2,27 @@
 
 import errno
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Literal, cast
 
-import mcap_ros2.writer
-from mcap.writer import CompressionType
+from mcap.well_known import MessageEncoding, Profile, SchemaEncoding
+from mcap.writer import CompressionType, Writer
+from mcap_ros2._dynamic import serialize_dynamic
 
 from ..errors import InvalidInputError, RecordingError
+from .ros2_qos import offered_qos
 from .ros2_schemas import SCHEMAS
 
 FORMAT_VERSION = "1"
 METADATA_NAME = "stereogrid"
 NOTE_NAME = "stereogrid/note"
+OWN_METADATA = ("format_version", "stereogrid_version")
+"""What every file says of itself."""
 
 
 class Ros2File:
@@ -25,7 +30,7 @@ class Ros2File:
 
     topics: message type by topic. Each `flush` writes all that came since the last one in one piece; what a full disk
     leaves of a piece is cut off again. grouped: a piece is one chunk, as files of many small messages need it, rather
-    than one a message; it is not compressed then.
+    than one a message.
     metadata: text kept in the file. Raises RecordingError when the file exists (unless overwrite) or cannot be written,
     InvalidInputError when the metadata are wrong.
     """
@@ -42,7 +47,7 @@ class Ros2File:
         self.path = Path(path)
         self._topics = topics
         self._grouped = grouped
-        own = {"format_version": FORMAT_VERSION, "stereogrid_version": _library_version()}
+        own = dict(zip(OWN_METADATA, (FORMAT_VERSION, _library_version()), strict=True))
         checked = _checked_metadata(metadata, own)
         self._pieces = _Pieces(self.path, "wb" if overwrite else "xb")
         try:
@@ -55,14 +60,18 @@ class Ros2File:
             raise
 
     def _begin(self, metadata: dict[str, str]) -> None:
-        self._mcap = mcap_ros2.writer.Writer(
+        self._mcap = Writer(
             cast("IO[bytes]", self._pieces),
             # A limit of zero bytes closes a chunk after every message.
             chunk_size=2**40 if self._grouped else 0,
-            compression=CompressionType.NONE if self._grouped else CompressionType.ZSTD,
+            compression=CompressionType.ZSTD,
         )
-        types = sorted(set(self._topics.values()))
-        self._schemas = {name: self._mcap.register_msgdef(name, SCHEMAS[name]) for name in types}
+        self._mcap.start(Profile.ROS2, f"stereogrid {_library_version()}")
+        self._schema_ids = {
+            name: self._mcap.register_schema(name, SchemaEncoding.ROS2, SCHEMAS[name].encode())
+            for name in sorted(set(self._topics.values()))
+        }
+        self._channel_ids: dict[str, int] = {}
         self._mcap.add_metadata(METADATA_NAME, metadata)
         self._pieces.flush()
 
@@ -73,8 +82,22 @@ class Ros2File:
 
     def write(self, topic: str, stamp_ns: int, message: Mapping[str, Any]) -> None:
         """Append a message, which is in the file after the next `flush`."""
+        self.write_encoded(topic, stamp_ns, _encoder(self._topics[topic])(message))
+
+    def write_encoded(self, topic: str, stamp_ns: int, cdr: bytes) -> None:
+        """Append a message in CDR, by our own definition of its type."""
         with self._reporting():
-            self._mcap.write_message(topic, self._schemas[self._topics[topic]], message, stamp_ns, stamp_ns)
+            self._mcap.add_message(self._channel(topic), log_time=stamp_ns, data=cdr, publish_time=stamp_ns)
+
+    def _channel(self, topic: str) -> int:
+        if topic not in self._channel_ids:
+            self._channel_ids[topic] = self._mcap.register_channel(
+                topic,
+                MessageEncoding.CDR,
+                self._schema_ids[self._topics[topic]],
+                {"offered_qos_profiles": offered_qos(topic)},
+            )
+        return self._channel_ids[topic]
 
     def note(self, key: str, text: str) -> None:
         """Add to the metadata what became known while recording; the notes of a file have different keys."""
@@ -92,8 +115,7 @@ class Ros2File:
         """Write all that came to the file."""
         with self._reporting():
             if self._grouped:
-                # The wrapper for ROS 2 does not pass this on.
-                self._mcap._writer.flush()
+                self._mcap.flush()  # type: ignore[no-untyped-call]
             self._pieces.flush()
 
     def sync(self) -> None:
@@ -112,7 +134,7 @@ class Ros2File:
         with self._reporting():
             try:
                 if self._pieces.failed is None:
-                    self._mcap.finish()
+                    self._mcap.finish()  # type: ignore[no-untyped-call]
                     self._pieces.flush()
             finally:
                 self._pieces.close()
@@ -202,6 +224,12 @@ class _Pieces:
 
     def close(self) -> None:
         self._file.close()
+
+
+@cache
+def _encoder(type_name: str) -> Callable[[Mapping[str, Any]], bytes]:
+    encode: Callable[[Mapping[str, Any]], bytes] = serialize_dynamic(type_name, SCHEMAS[type_name])[type_name]
+    return encode
 
 
 def _checked_metadata(metadata: Mapping[str, str], own: dict[str, str]) -> dict[str, str]:

@@ -13,18 +13,22 @@ from scipy.spatial.transform import Rotation
 
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
-from ..geometry import FloatArray, as_pose, from_quaternion_wxyz, quaternion_wxyz
+from ..geometry import FloatArray, as_pose, from_quaternion_wxyz, from_rotation, quaternion_wxyz
+from ..jpeg_header import is_jpeg
 from ..observation import FloatImage, Image
 from .images import encode_png
 from .ros2_schemas import SCHEMAS
 
 Message: TypeAlias = dict[str, Any]
+Transform: TypeAlias = tuple[str, str, FloatArray]
+"""Parent frame, child frame, T_parent_child (4, 4)."""
 
 LEFT_IMAGE = "/left/image_rect/compressed"
 RIGHT_IMAGE = "/right/image_rect/compressed"
 LEFT_INFO = "/left/camera_info"
 RIGHT_INFO = "/right/camera_info"
 ODOMETRY = "/odom"
+TF = "/tf"
 TF_STATIC = "/tf_static"
 TRUE_POSE = "/truth/pose"
 TRUE_DEPTH = "/truth/depth"
@@ -37,6 +41,7 @@ TOPICS = {
     LEFT_INFO: "sensor_msgs/msg/CameraInfo",
     RIGHT_INFO: "sensor_msgs/msg/CameraInfo",
     ODOMETRY: "nav_msgs/msg/Odometry",
+    TF: "tf2_msgs/msg/TFMessage",
     TRUE_POSE: "geometry_msgs/msg/PoseStamped",
     TRUE_BASE: "geometry_msgs/msg/PoseStamped",
     TRUE_MOVERS: "tf2_msgs/msg/TFMessage",
@@ -48,8 +53,14 @@ TOPICS = {
 """Message type of each topic, in the order in which an observation is written."""
 
 WHEEL_NAMES = ["left_wheels", "right_wheels"]
-CAMERA_FRAME = "left_camera_optical"
+WORLD_FRAME = "world"
+ODOM_FRAME = "odom"
 BASE_FRAME = "base_link"
+CAMERA_FRAME = "left_camera_optical"
+RIGHT_CAMERA_FRAME = "right_camera_optical"
+TRUE_BASE_FRAME = "base_link_true"
+TRUE_CAMERA_FRAME = "left_camera_optical_true"
+"""Of the frames of the truth: a frame has one parent, and base_link's is odom."""
 
 _UNIT_TOLERANCE = 1e-3
 _LAST_STAMP_NS = (2**31 - 1) * 10**9
@@ -94,7 +105,7 @@ def pose_message(T: FloatArray) -> Message:
 def odometry_message(stamp_ns: int, T_odom_base: FloatArray) -> Message:
     """nav_msgs/Odometry, odom -> base_link; covariance and twist stay zero, that is, unknown."""
     return {
-        "header": header(stamp_ns, "odom"),
+        "header": header(stamp_ns, ODOM_FRAME),
         "child_frame_id": BASE_FRAME,
         "pose": {"pose": pose_message(T_odom_base)},
     }
@@ -102,7 +113,7 @@ def odometry_message(stamp_ns: int, T_odom_base: FloatArray) -> Message:
 
 def true_pose_message(stamp_ns: int, T_world_frame: FloatArray) -> Message:
     """geometry_msgs/PoseStamped of the left camera, or of the robot's base, in the frame `world`."""
-    return {"header": header(stamp_ns, "world"), "pose": pose_message(T_world_frame)}
+    return {"header": header(stamp_ns, WORLD_FRAME), "pose": pose_message(T_world_frame)}
 
 
 def wheels_message(stamp_ns: int, wheels_rad: FloatArray) -> Message:
@@ -110,28 +121,36 @@ def wheels_message(stamp_ns: int, wheels_rad: FloatArray) -> Message:
     return {"header": header(stamp_ns, BASE_FRAME), "name": WHEEL_NAMES, "position": wheels_rad.tolist()}
 
 
-def static_transform_message(stamp_ns: int, T_base_cam: FloatArray) -> Message:
-    """tf2_msgs/TFMessage with the one transform base_link -> left_camera_optical."""
-    return {"transforms": [_stamped_transform(stamp_ns, (BASE_FRAME, CAMERA_FRAME), T_base_cam)]}
+def static_transform_message(stamp_ns: int, T_base_cam: FloatArray, *others: Transform) -> Message:
+    """tf2_msgs/TFMessage of base_link -> left_camera_optical and others."""
+    return transforms_message(stamp_ns, [(BASE_FRAME, CAMERA_FRAME, T_base_cam), *others])
+
+
+def right_camera(baseline_m: float) -> Transform:
+    """Where the rectified right camera stands."""
+    return CAMERA_FRAME, RIGHT_CAMERA_FRAME, from_rotation(np.eye(3), [baseline_m, 0.0, 0.0])
 
 
 def movers_message(stamp_ns: int, movers: Mapping[str, FloatArray]) -> Message:
     """tf2_msgs/TFMessage of the true poses (4, 4) of what moves, by name, in the frame `world`."""
-    return {"transforms": [_stamped_transform(stamp_ns, ("world", name), T) for name, T in movers.items()]}
+    return transforms_message(stamp_ns, [(WORLD_FRAME, name, T) for name, T in movers.items()])
 
 
-def _stamped_transform(stamp_ns: int, frames: tuple[str, str], T_parent_child: FloatArray) -> Message:
-    transform = {"translation": _vector(T_parent_child[:3, 3]), "rotation": _quaternion(T_parent_child)}
-    return {"header": header(stamp_ns, frames[0]), "child_frame_id": frames[1], "transform": transform}
+def transforms_message(stamp_ns: int, transforms: Iterable[Transform]) -> Message:
+    """tf2_msgs/TFMessage."""
+    return {"transforms": [_stamped_transform(stamp_ns, each) for each in transforms]}
+
+
+def _stamped_transform(stamp_ns: int, transform: Transform) -> Message:
+    parent, child, T = transform
+    numbers = {"translation": _vector(T[:3, 3]), "rotation": _quaternion(T)}
+    return {"header": header(stamp_ns, parent), "child_frame_id": child, "transform": numbers}
 
 
 def camera_info_message(stamp_ns: int, camera: StereoCamera, *, right: bool) -> Message:
-    """sensor_msgs/CameraInfo of one rectified camera.
-
-    Both stand in the left camera's frame, as stereo_image_proc wants it.
-    """
+    """sensor_msgs/CameraInfo of one rectified camera."""
     return {
-        "header": header(stamp_ns, CAMERA_FRAME),
+        "header": header(stamp_ns, camera_frame(right=right)),
         "height": camera.height_px,
         "width": camera.width_px,
         "distortion_model": "plumb_bob",
@@ -142,21 +161,32 @@ def camera_info_message(stamp_ns: int, camera: StereoCamera, *, right: bool) -> 
     }
 
 
-def image_message(stamp_ns: int, image: Image) -> Message:
+def camera_frame(*, right: bool) -> str:
+    """The frame of a camera."""
+    return RIGHT_CAMERA_FRAME if right else CAMERA_FRAME
+
+
+def image_format(encoded: bytes) -> str:
+    """What a CompressedImage with these bytes says of them.
+
+    What image_transport writes, "mono8; png compressed", is refused by viewers that know formats by their names.
+    """
+    return "jpeg" if is_jpeg(encoded) else "png"
+
+
+def image_message(stamp_ns: int, image: Image, *, right: bool = False) -> Message:
     """sensor_msgs/CompressedImage: a PNG of the (H, W) uint8 image."""
-    return {
-        "header": header(stamp_ns, CAMERA_FRAME),
-        "format": "mono8; png compressed",
-        "data": encode_png(image),
-    }
+    encoded = encode_png(image)
+    frame = camera_frame(right=right)
+    return {"header": header(stamp_ns, frame), "format": image_format(encoded), "data": encoded}
 
 
 def depth_message(stamp_ns: int, depth_m: FloatImage) -> Message:
-    """sensor_msgs/Image 32FC1 of a depth image (H, W) [m], NaN where unknown (REP 118)."""
+    """sensor_msgs/Image 32FC1 of a true depth image (H, W) [m], NaN where unknown (REP 118)."""
     depth = np.ascontiguousarray(depth_m, dtype="<f4")
     height, width = depth.shape
     return {
-        "header": header(stamp_ns, CAMERA_FRAME),
+        "header": header(stamp_ns, TRUE_CAMERA_FRAME),
         "height": height,
         "width": width,
         "encoding": "32FC1",
@@ -194,9 +224,16 @@ def read_pose(pose: Any, name: str) -> FloatArray:
 
 def read_poses(poses: Sequence[Any]) -> tuple[FloatArray, NDArray[np.bool_]]:
     """(K, 4, 4) of decoded geometry_msgs/Pose, and which of them (K,) are none: not finite, or no unit quaternion."""
-    numbers = np.array(
-        [[each.position.x, each.position.y, each.position.z, *_xyzw(each.orientation)] for each in poses]
-    ).reshape(-1, 7)
+    return _read_all([(each.position, each.orientation) for each in poses])
+
+
+def read_transforms(transforms: Sequence[Any]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """As `read_poses`, of decoded geometry_msgs/Transform."""
+    return _read_all([(each.translation, each.rotation) for each in transforms])
+
+
+def _read_all(places: Sequence[tuple[Any, Any]]) -> tuple[FloatArray, NDArray[np.bool_]]:
+    numbers = np.array([[t.x, t.y, t.z, *_xyzw(rotation)] for t, rotation in places]).reshape(-1, 7)
     wrong = ~np.isfinite(numbers).all(axis=1) | ~(np.abs(np.linalg.norm(numbers[:, 3:], axis=1) - 1) <= _UNIT_TOLERANCE)
     numbers[wrong] = [0, 0, 0, 0, 0, 0, 1]
     T = np.tile(np.eye(4), (len(numbers), 1, 1))
@@ -215,6 +252,11 @@ def read_static_transform(transforms: Iterable[Any]) -> FloatArray:
         if (stamped.header.frame_id, stamped.child_frame_id) == (BASE_FRAME, CAMERA_FRAME):
             return read_transform(stamped.transform.translation, stamped.transform.rotation, "T_base_cam")
     raise InvalidInputError(f"{TF_STATIC} holds no transform {BASE_FRAME} -> {CAMERA_FRAME}")
+
+
+def has_static_transform(transforms: Iterable[Any]) -> bool:
+    """Whether read_static_transform would find one."""
+    return any((each.header.frame_id, each.child_frame_id) == (BASE_FRAME, CAMERA_FRAME) for each in transforms)
 
 
 def read_movers(message: Any) -> dict[str, FloatArray]:

@@ -11,9 +11,7 @@ from ..calibration.rig import check_rectifying_turn
 from ..camera import DISTORTION_SIZES, Rectification
 from ..errors import InvalidInputError, unknown_name
 from ..geometry import FloatArray, as_floats, from_rotation
-from ..observation import Image
 from . import ros2_messages as ros2
-from .images import decode_grey, grey, image_size
 from .ros2_messages import Message
 
 KIND, RAW = "kind", "raw"
@@ -25,6 +23,7 @@ BATTERY = "/battery"
 DIAGNOSTICS = "/diagnostics"
 
 TOPICS = {
+    ros2.TF: "tf2_msgs/msg/TFMessage",
     ros2.TF_STATIC: "tf2_msgs/msg/TFMessage",
     ros2.LEFT_INFO: "sensor_msgs/msg/CameraInfo",
     ros2.RIGHT_INFO: "sensor_msgs/msg/CameraInfo",
@@ -43,8 +42,6 @@ _UNKNOWN = float("nan")
 _SONAR_CONE_RAD, _SONAR_NEAREST_M, _SONAR_FARTHEST_M = np.radians(30.0), 0.15, 5.0
 """Of a Pioneer's sonars."""
 _OK, _ERROR = 0, 2
-_GREY_OF = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
-"""Channels by encoding of an uncompressed picture."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +55,13 @@ class CameraMatrices:
     size_px: tuple[int, int]
 
 
-def camera_info_message(stamp_ns: int, camera: CameraMatrices) -> Message:
-    """sensor_msgs/CameraInfo of one raw camera, in the frame of the left one, as stereo_image_proc wants it."""
+def camera_info_message(stamp_ns: int, camera: CameraMatrices, *, right: bool = False) -> Message:
+    """sensor_msgs/CameraInfo of one raw camera."""
     distortion = camera.distortion.ravel().tolist()
     distortion += [0.0] * (5 - len(distortion))
     width, height = camera.size_px
     return {
-        "header": ros2.header(stamp_ns, ros2.CAMERA_FRAME),
+        "header": ros2.header(stamp_ns, ros2.camera_frame(right=right)),
         "height": height,
         "width": width,
         "distortion_model": DISTORTION_MODELS[len(distortion) > 5],
@@ -118,14 +115,18 @@ def odometry_message(stamp_ns: int, T_odom_base: FloatArray, twist: tuple[float,
     piece: how often the motion was lost before. A pose after that is in a frame of its own, since where that lies in
     the one before nobody knows: `odom`, then `odom_1`, ...
     """
-    frame = f"odom_{piece}" if piece else "odom"
     speed_mps, turn_radps = twist
     return {
-        "header": ros2.header(stamp_ns, frame),
+        "header": ros2.header(stamp_ns, odometry_frame(piece)),
         "child_frame_id": ros2.BASE_FRAME,
         "pose": {"pose": ros2.pose_message(T_odom_base)},
         "twist": {"twist": {"linear": _xyz(speed_mps, 0.0, 0.0), "angular": _xyz(0.0, 0.0, turn_radps)}},
     }
+
+
+def odometry_frame(piece: int) -> str:
+    """The frame of the poses of a piece of the drive."""
+    return f"{ros2.ODOM_FRAME}_{piece}" if piece else ros2.ODOM_FRAME
 
 
 def _xyz(*numbers: float) -> dict[str, float]:
@@ -162,30 +163,3 @@ def diagnostics_message(stamp_ns: int, fault: str, values: Mapping[str, str]) ->
         "values": [{"key": key, "value": value} for key, value in values.items()],
     }
     return {"header": ros2.header(stamp_ns, ros2.BASE_FRAME), "status": [status]}
-
-
-def read_image(message: Any, name: str, shape: tuple[int, int]) -> Image:
-    """The grey picture (H, W) uint8 of a decoded CompressedImage (PNG, JPEG) or Image.
-
-    Raises InvalidInputError or RecordingError, naming `name`, when it is not of this shape or cannot be read.
-    """
-    if not hasattr(message, "encoding"):
-        _check_shape(name, image_size(message.data, name), shape)
-        return decode_grey(message.data, name)
-    _check_shape(name, (message.height, message.width), shape)
-    channels = _GREY_OF.get(message.encoding)
-    if channels is None:
-        raise unknown_name(f"encoding of {name}", message.encoding, _GREY_OF)
-    rows = np.frombuffer(message.data, np.uint8)
-    if message.step < channels * message.width or rows.size < message.step * message.height:
-        raise InvalidInputError(f"{name}: {rows.size} bytes are too few for {message.width}x{message.height} px")
-    rows = rows[: message.step * message.height].reshape(message.height, message.step)
-    pixels = rows[:, : channels * message.width].reshape(message.height, message.width, channels)
-    if message.encoding.startswith("rgb"):
-        pixels = pixels[:, :, [2, 1, 0, *range(3, channels)]]
-    return grey(np.ascontiguousarray(pixels.squeeze(axis=2) if channels == 1 else pixels))
-
-
-def _check_shape(name: str, shape: tuple[int, int], expected: tuple[int, int]) -> None:
-    if shape != expected:
-        raise InvalidInputError(f"{name} is {shape}, the recording's camera {expected}")

@@ -30,6 +30,21 @@ _STAMPED = ("std_msgs/Header", "builtin_interfaces/Time")
 _POSE = ("geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion")
 
 
+_POWER_SUPPLY = {
+    "STATUS": ("UNKNOWN", "CHARGING", "DISCHARGING", "NOT_CHARGING", "FULL"),
+    "HEALTH": (
+        *("UNKNOWN", "GOOD", "OVERHEAT", "DEAD", "OVERVOLTAGE", "UNSPEC_FAILURE", "COLD"),
+        *("WATCHDOG_TIMER_EXPIRE", "SAFETY_TIMER_EXPIRE"),
+    ),
+    "TECHNOLOGY": ("UNKNOWN", "NIMH", "LION", "LIPO", "LIFE", "NICD", "LIMN"),
+}
+_POWER_SUPPLY_CONSTANTS = "".join(
+    f"uint8 POWER_SUPPLY_{kind}_{name}={number}\n"
+    for kind, names in _POWER_SUPPLY.items()
+    for number, name in enumerate(names)
+)
+
+
 def _schema(text: str, *parts: str) -> str:
     rule = "=" * 80
     return "\n".join([text, *(f"{rule}\nMSG: {part}\n{_PARTS[part]}" for part in parts)]) + "\n"
@@ -66,7 +81,8 @@ SCHEMAS = {
         *_STAMPED,
     ),
     "sensor_msgs/msg/BatteryState": _schema(
-        "std_msgs/Header header\nfloat32 voltage\nfloat32 temperature\nfloat32 current\nfloat32 charge\n"
+        _POWER_SUPPLY_CONSTANTS
+        + "std_msgs/Header header\nfloat32 voltage\nfloat32 temperature\nfloat32 current\nfloat32 charge\n"
         "float32 capacity\nfloat32 design_capacity\nfloat32 percentage\nuint8 power_supply_status\n"
         "uint8 power_supply_health\nuint8 power_supply_technology\nbool present\nfloat32[] cell_voltage\n"
         "float32[] cell_temperature\nstring location\nstring serial_number",
@@ -82,6 +98,16 @@ SCHEMAS = {
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort", *_STAMPED
     ),
     "geometry_msgs/msg/PoseStamped": _schema("std_msgs/Header header\nPose pose", *_STAMPED, *_POSE),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _schema(
+        "std_msgs/Header header\nPoseWithCovariance pose", *_STAMPED, "geometry_msgs/PoseWithCovariance", *_POSE
+    ),
+    "geometry_msgs/msg/TransformStamped": _schema(
+        "std_msgs/Header header\nstring child_frame_id\nTransform transform",
+        *_STAMPED,
+        "geometry_msgs/Transform",
+        "geometry_msgs/Vector3",
+        "geometry_msgs/Quaternion",
+    ),
     "tf2_msgs/msg/TFMessage": _schema(
         "geometry_msgs/TransformStamped[] transforms",
         "geometry_msgs/TransformStamped",

@@ -9,18 +9,17 @@ from numpy.typing import NDArray
 from ..camera import StereoCamera
 from ..errors import InvalidInputError
 from ..geometry import FloatArray
+from ..intervals import Bounds
+from .blocks import UNSAFE_BELOW, BlockBootstrap
 from .calibration import ReliabilityTable, calibration_scores, entropy_bit, reliability_table
 from .labels import OCCUPIED, CellLabels
 from .names import SCORE_NAMES
 from .ranking import ranking_scores, ratio
 from .score import Score
-from .surface import SeenSurface, map_surface_m, surface_scores
+from .surface import SeenSurface, map_surface_m, scores_of_distances, surface_distances_m
 from .visibility import VisibleSet
 
 Mask = NDArray[np.bool_]
-
-UNSAFE_BELOW = 0.2
-"""An occupied cell below this probability looks free to a planner."""
 
 SIGMA_PX = 0.5
 """Disparity error of block matching on real pairs, for the tolerance tau when none is measured."""
@@ -73,23 +72,35 @@ def score_map(
     seen: SeenSurface | None = None,
     camera: StereoCamera | None = None,
     sigma_px: float = SIGMA_PX,
+    blocks: BlockBootstrap | None = None,
 ) -> list[Score]:
     """Every score of SCORE_NAMES in its order; those of the surface only when it is given as seen.
 
     prior: what an unknown cell counts as. camera and sigma_px [px] set dl of the tolerance (Eq. 8); without
-    a camera tau is one cell. A score that is not defined (an empty class, no map) is NaN. Raises
-    InvalidInputError when V and the labels differ in shape, V is empty, or the map answers with what is no
-    probability.
+    a camera tau is one cell. blocks: give the scores their intervals. A score that is not defined (an empty class, no
+    map) is NaN. Raises InvalidInputError when V and the labels differ in shape, V is empty, or the map answers with
+    what is no probability.
     """
     if not 0 < prior < 1:
         raise InvalidInputError(f"prior must lie between 0 and 1, not {prior}")
     cells = sample_cells(grid, labels, visible, camera=camera, sigma_px=sigma_px)
     values = _coverage(cells) | _ranking(cells, prior) | _calibration(cells, prior) | _others(cells, prior)
+    bounds: dict[str, Bounds] = {}
+    if blocks is not None:
+        bounds |= blocks.of_cells(cells, labels.centres_m(visible.mask), prior=prior, values=values)
     if seen is not None:
         map_m = map_surface_m(grid.occupied_centres(), labels, visible)
-        values |= surface_scores(map_m, seen.surface, seen.samples_m, cell_m=labels.cell_m)
+        distances = surface_distances_m(map_m, seen.surface, seen.samples_m)
+        values |= scores_of_distances(*distances, cell_m=labels.cell_m)
         values |= {f"floor_{name}": value for name, value in seen.floor.items()}
-    return [Score(n, values[n][0], unit, values[n][1]) for n, (unit, _) in SCORE_NAMES.items() if n in values]
+        if blocks is not None:
+            points_m = map_m, seen.samples_m
+            bounds |= blocks.of_surface(points_m, distances, cell_m=labels.cell_m, values=values)
+    return [
+        Score(name, values[name][0], unit, values[name][1], *bounds.get(name, (None, None)))
+        for name, (unit, _) in SCORE_NAMES.items()
+        if name in values
+    ]
 
 
 def map_reliability(

@@ -84,3 +84,10 @@ BOUND_NAMES: dict[str, tuple[str, str]] = {
     },
 }
 """name -> (unit, meaning) of what `BoundTest` gives. No name of these is one of a map's."""
+
+PLAIN_NAMES: dict[str, tuple[str, str]] = {
+    "camera_height_m": ("m", "height of the camera over the map's ground along its path: compare with a tape measure"),
+    "disparity_density": (DIMENSIONLESS, "share of the left image's pixels that the matcher gave a disparity"),
+    "known_cells": ("cell", "cells that the map has touched, free or occupied"),
+}
+"""name -> (unit, meaning) of what any map has, without a truth."""

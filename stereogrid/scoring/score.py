@@ -16,33 +16,50 @@ class Score:
     """A number that never travels without its unit; NaN means undefined (an empty class, an empty map).
 
     unit: "m", "bit", "nat", or "1" for a pure number. n: how many cells, points or hits it was taken over.
+    low, high: its 95 % interval, where it has one (else None both); who gives it says of what.
     """
 
     name: str
     value: float
     unit: str
     n: int
+    low: float | None = None
+    high: float | None = None
 
     def __post_init__(self) -> None:
         if not self.name or not self.unit:
             raise InvalidInputError(f"a score needs a name and a unit, not {self.name!r} and {self.unit!r}")
         if self.n < 0:
             raise InvalidInputError(f"score {self.name}: n must be >= 0, not {self.n}")
+        if (self.low is None) != (self.high is None):
+            raise InvalidInputError(f"score {self.name}: an interval has two ends, not {self.low} and {self.high}")
+        if self.low is not None and self.high is not None and not self.low <= self.high:
+            raise InvalidInputError(f"score {self.name}: an interval goes up, not from {self.low} to {self.high}")
         object.__setattr__(self, "value", float(self.value))
         object.__setattr__(self, "n", int(self.n))
 
     @property
     def text(self) -> str:
         """The value for a table, without its unit: three decimals, whole counts in full, - for NaN."""
-        if math.isnan(self.value):
-            return "-"
-        if abs(self.value) >= 1000 and self.value == round(self.value):
-            return f"{self.value:,.0f}"
-        return f"{self.value:.3f}" if abs(self.value) >= 0.001 or self.value == 0 else f"{self.value:.1e}"
+        return _text(self.value)
+
+    @property
+    def interval_text(self) -> str:
+        """Its interval for a table, without the unit; nothing where there is none."""
+        return "" if self.low is None or self.high is None else f"{_text(self.low)} to {_text(self.high)}"
+
+
+def _text(value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    if abs(value) >= 1000 and value == round(value):
+        return f"{value:,.0f}"
+    return f"{value:.3f}" if abs(value) >= 0.001 or value == 0 else f"{value:.1e}"
 
 
 def scores_to_dict(scores: Iterable[Score]) -> dict[str, dict[str, Any]]:
-    """{name: {value, unit, n}}, ready for json.dump: a value that is not finite becomes None (null).
+    """{name: {value, unit, n}}, with low and high where there is an interval, ready for json.dump: a value that is not
+    finite becomes None (null).
 
     Raises InvalidInputError when two scores bear one name.
     """
@@ -52,6 +69,8 @@ def scores_to_dict(scores: Iterable[Score]) -> dict[str, dict[str, Any]]:
             raise InvalidInputError(f"two scores are named {score.name!r}")
         value = score.value if math.isfinite(score.value) else None
         plain[score.name] = {"value": value, "unit": score.unit, "n": score.n}
+        if score.low is not None:
+            plain[score.name] |= {"low": score.low, "high": score.high}
     return plain
 
 
@@ -66,5 +85,5 @@ def scores_from_dict(plain: Mapping[str, Mapping[str, Any]]) -> list[Score]:
         if missing:
             raise InvalidInputError(f"score {name!r} lacks {', '.join(sorted(missing))}")
         value = math.nan if row["value"] is None else row["value"]
-        scores.append(Score(name, value, row["unit"], row["n"]))
+        scores.append(Score(name, value, row["unit"], row["n"], row.get("low"), row.get("high")))
     return scores

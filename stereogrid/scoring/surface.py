@@ -107,11 +107,20 @@ def surface_scores(
 
     An empty A has no distances (NaN) and F = 0.
     """
-    from_map = surface.distance_m(map_m)
+    return scores_of_distances(*surface_distances_m(map_m, surface, truth_m), cell_m=cell_m)
+
+
+def surface_distances_m(map_m: FloatArray, surface: Surface, truth_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances (N,) of A = map_m (N, 3) to the mesh and (M,) of B = truth_m (M, 3) to A, infinite without A [m]."""
     from_truth = np.full(len(truth_m), np.inf)
     if len(map_m):
         from_truth[:] = KDTree(map_m).query(truth_m)[0]
-    n_map, n_truth = len(map_m), len(truth_m)
+    return surface.distance_m(map_m), from_truth
+
+
+def scores_of_distances(from_map: FloatArray, from_truth: FloatArray, *, cell_m: float) -> dict[str, tuple[float, int]]:
+    """{name: (value, n)} of the distances of surface_distances_m."""
+    n_map, n_truth = len(from_map), len(from_truth)
     accuracy_m, accuracy_p95_m = _mean_and_p95(from_map)
     completeness_m, completeness_p95_m = _mean_and_p95(from_truth[np.isfinite(from_truth)])
     scores = {

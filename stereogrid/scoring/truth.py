@@ -11,6 +11,7 @@ import numpy as np
 from ..camera import StereoCamera
 from ..errors import InvalidInputError, RecordingError
 from ..geometry import FloatArray
+from .blocks import BLOCK_CELLS, FEWEST_BLOCKS, BlockBootstrap
 from .calibration import ReliabilityTable
 from .heights import ground_height_m
 from .labels import CellLabels, label_cells
@@ -72,6 +73,8 @@ class MapTruth:
             raise RecordingError("the recording carries no true mesh and poses, so there is nothing to score against")
         mesh = load_ply(mesh_ply)
         known = poses[~np.isnan(poses).any(axis=(1, 2))]
+        if not len(known):
+            raise RecordingError("of no observation the true pose is known, so there is nothing to score against")
         # One cell around the mesh, as where all of it is labelled.
         ends_m = mesh.bounds + np.array([[-cell_m], [cell_m]])
         bounds_m = bounds_around(known, ends_m, max_range_m + AROUND_M) if around_path else None
@@ -107,14 +110,46 @@ class MapTruth:
         return replace(part, visible=VisibleSet(nearest_m, part.visible.in_view & kept))
 
     def score(
-        self, grid: ScoredMap, *, prior: float = 0.5, sigma_px: float = SIGMA_PX, surface: bool = True
+        self,
+        grid: ScoredMap,
+        *,
+        prior: float = 0.5,
+        sigma_px: float = SIGMA_PX,
+        surface: bool = True,
+        intervals: bool = False,
     ) -> list[Score]:
         """Every score of SCORE_NAMES of a map of this drive; arguments as in score_map.
 
-        surface: whether to give those of the surface too, which take the most time.
+        surface: whether to give those of the surface too, which take the most time. intervals: whether to give 95 %
+        intervals, from blocks of the map (scoring.blocks); interval_note says of what.
         """
-        seen = self.seen_surface if surface else None
-        return score_map(grid, self.labels, self.visible, prior=prior, seen=seen, camera=self.camera, sigma_px=sigma_px)
+        return score_map(
+            grid,
+            self.labels,
+            self.visible,
+            prior=prior,
+            seen=self.seen_surface if surface else None,
+            camera=self.camera,
+            sigma_px=sigma_px,
+            blocks=self.blocks if intervals else None,
+        )
+
+    @property
+    def blocks(self) -> BlockBootstrap:
+        """The blocks that intervals of scores of such maps are from."""
+        return BlockBootstrap(BLOCK_CELLS * self.labels.cell_m)
+
+    @cached_property
+    def interval_note(self) -> str:
+        """What the intervals of scores are, for a reader."""
+        n = self.blocks.block_of(self.labels.centres_m(self.visible.mask))[1]
+        if n < FEWEST_BLOCKS:
+            return f"Scores have no intervals: the {n} blocks of {self.blocks.block_m:g} m that were seen are too few."
+        return (
+            f"95 % intervals: from blocks of the map of {self.blocks.block_m:g} m x {self.blocks.block_m:g} m, {n} of "
+            "them seen, drawn again 1000 times. They say how much a score hangs on where one looked; what errs in the "
+            "whole map alike, such as drift, is not in them."
+        )
 
     @cached_property
     def seen_surface(self) -> SeenSurface:

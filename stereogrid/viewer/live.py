@@ -3,7 +3,6 @@
 import threading
 import time
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
 from types import TracebackType
 
 import numpy as np
@@ -11,9 +10,12 @@ import numpy as np
 from ..camera import StereoCamera
 from ..geometry import FloatArray
 from ..grid import OccupancyGrid
+from ..mapped import ABOVE_CAMERA_M
 from ..observation import Image
+from .cells_drawn import draw_map, legend_of
+from .controls import Controls, Offers
 from .scene import MapScene
-from .server import close_server, open_server
+from .server import close_server, open_server, url_of
 from .snapshot import Snapshot
 
 PERIOD_S = 0.5
@@ -21,6 +23,7 @@ MOST_SHARE = 0.1
 """Of one processor's time: where a map is so large that drawing it takes long, it is drawn less often."""
 STEP_M = 0.02
 """The path is drawn in steps of at least this."""
+HIGHEST_M = 4.0
 
 
 class LiveView:
@@ -44,7 +47,13 @@ class LiveView:
         title: str = "stereogrid",
     ) -> None:
         self._server = open_server(port, title)
-        self._scene = MapScene(self._server, camera, camera_height_m=camera_height_m, range_m=range_m)
+        self._scene = MapScene(self._server, camera, fade_m=8 * range_m)
+        self._scene.look_from(
+            (-0.45 * range_m, -0.4 * range_m, 0.6 * range_m), look_at_m=(0.6 * range_m, 0.0, 0.1 * range_m)
+        )
+        ends_m = (-range_m, -range_m, -1.0), (2 * range_m, range_m, HIGHEST_M)
+        heights_m = ends_m[0][2], round(camera_height_m + ABOVE_CAMERA_M, 1)
+        self._controls = Controls(self._server, Offers(("height", "probability"), ends_m, heights_m))
         self._grid: OccupancyGrid | None = None
         self._lock: AbstractContextManager[object] = nullcontext()
         self._seen: tuple[Image, FloatArray] | None = None
@@ -59,7 +68,7 @@ class LiveView:
     @property
     def url(self) -> str:
         """Of the page."""
-        return f"http://127.0.0.1:{self._server.get_port()}/"
+        return url_of(self._server)
 
     def __enter__(self) -> "LiveView":
         return self
@@ -104,12 +113,13 @@ class LiveView:
             self._scene.draw_path(np.array(self._path_m))
         if grid is None:
             return
-        choices = replace(self._scene.choices)
+        choices = self._controls.choices
         with self._lock:
             snapshot = Snapshot.of(grid)
-        centres_m = snapshot.occupied_m(choices.threshold, choices.below_m)
-        drawn = choices, len(centres_m), hash(centres_m.tobytes())
+        blocks = snapshot.cells()
+        drawn = choices, hash(blocks.values.tobytes())
         if drawn != self._drawn:
-            self._scene.draw_cells(centres_m, snapshot.cell_m)
-            self._scene.say(f"{len(centres_m):,} cells of {100 * snapshot.cell_m:g} cm")
-            self._drawn, self.drawn = drawn, len(centres_m)
+            shown = draw_map(self._scene, blocks, choices, dragged=self._controls.move_slice)
+            self._controls.show_legend(legend_of(choices))
+            self._controls.say(shown.words)
+            self._drawn, self.drawn = drawn, shown.count

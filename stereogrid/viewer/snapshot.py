@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry import Array, FloatArray, as_floats
+from ..geometry import Array
 from ..grid import OccupancyGrid
-from ..grid.blocks import BLOCK
 from ..grid.cells import LogOddsCells
+from .cell_blocks import UNKNOWN, CellBlocks
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,12 @@ class Snapshot:
         blocks = grid.blocks
         return cls(blocks.indices(), blocks.words[: len(blocks)].copy(), blocks.rule, grid.cell_m)
 
-    def occupied_m(self, threshold: float, below_m: float = np.inf) -> FloatArray:
-        """Centres (N, 3) in world [m] of the known cells with p > threshold that lie below the height below_m."""
-        words = self.words
-        row, place = np.nonzero((words >= self.rule.least_word_above(threshold)) & ((words & self.rule.count_mask) > 0))
-        within = np.stack(np.unravel_index(place, (BLOCK, BLOCK, BLOCK)), axis=-1)
-        centres = as_floats((self.indices[row] * BLOCK + within + 0.5) * self.cell_m)
-        return centres[centres[:, 2] < below_m]
+    def values(self) -> Array:
+        """(B, 512) int16 as CellBlocks has them."""
+        limit = np.iinfo(np.int16).max
+        values = np.clip(self.words >> self.rule.count_bits, -limit, limit)
+        return np.where((self.words & self.rule.count_mask) > 0, values, UNKNOWN).astype(np.int16)
+
+    def cells(self) -> CellBlocks:
+        """What is drawn of it."""
+        return CellBlocks(self.indices, self.values(), self.rule, self.cell_m)

@@ -213,5 +213,8 @@ def test_an_unknown_option_is_refused_with_the_choices(name):
 
 
 def test_an_unknown_matcher_is_refused_with_the_choices():
-    with pytest.raises(InvalidInputError, match=f"no matcher named 'sgmb'; choose from: {', '.join(sorted(MATCHERS))}"):
+    with pytest.raises(
+        InvalidInputError,
+        match=rf"no matcher named 'sgmb'; did you mean 'sgbm'\? choose from: {', '.join(sorted(MATCHERS))}",
+    ):
         matcher("sgmb")

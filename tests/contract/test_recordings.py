@@ -7,6 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from drawn_bags import drive as drawn_drive
+from drawn_bags import write_bag1, write_bag2
+from euroc_folders import write_euroc
+from kitti_drives import KittiDrive
+from plain_folders import write_folder
+from rgbd_folders import write_frames, write_tum
 from scipy.spatial.transform import Rotation
 
 from stereogrid.calibration import StereoCalibration
@@ -14,9 +20,13 @@ from stereogrid.camera import StereoCamera
 from stereogrid.geometry import R_BASE_OPTICAL, as_pose, from_rotation, from_yaw
 from stereogrid.observation import Observation, Odometry, Recording, Truth
 from stereogrid.recording import (
+    RECORDINGS,
+    FileRecording,
     McapWriter,
     RawReport,
     RawWriter,
+    RgbdRecording,
+    Selection,
     ShuffledPoses,
     Subset,
     TruePoses,
@@ -28,7 +38,7 @@ CAMERA = StereoCamera(focal_px=40, cx_px=15.5, cy_px=11.5, baseline_m=0.06, widt
 N = 6
 
 
-def mcap(folder: Path) -> Recording:
+def mcap(folder: Path) -> FileRecording:
     rng = np.random.default_rng(0)
     T_base_cam = from_rotation(R_BASE_OPTICAL, [0.1, 0.03, 0.4])
     with McapWriter(folder / "drive.mcap", CAMERA, T_base_cam) as writer:
@@ -66,22 +76,52 @@ def kitti(folder: Path) -> Recording:
     return open_recording(folder)
 
 
-def real_kitti(folder: Path) -> Recording:
-    data = os.environ.get("STEREOGRID_DATA")
-    if not data:
-        pytest.skip("needs the data set sequences/kitti_straight: set STEREOGRID_DATA to shared/data")
-    return open_recording(Path(data) / "sequences" / "kitti_straight")
+def real(name: str) -> Callable[[Path], Recording]:
+    """A maker of real data."""
+
+    def opened(folder: Path) -> Recording:
+        data = os.environ.get("STEREOGRID_DATA")
+        if not data:
+            pytest.skip(f"needs the data set sequences/{name}: set STEREOGRID_DATA to shared/data")
+        return open_recording(Path(data) / "sequences" / name)
+
+    return opened
+
+
+def bag1(folder: Path) -> Recording:
+    return open_recording(write_bag1(folder / "a.bag", drawn_drive()))
+
+
+def bag2(folder: Path) -> Recording:
+    return open_recording(write_bag2(folder / "a", drawn_drive()))
+
+
+def bag2_mcap(folder: Path) -> Recording:
+    return open_recording(write_bag2(folder / "a", drawn_drive(), "mcap"))
 
 
 MAKERS: dict[str, Callable[[Path], Recording]] = {
     "mcap": mcap,
     "raw": raw,
     "kitti": kitti,
-    "real_kitti": real_kitti,
+    "euroc": lambda folder: open_recording(write_euroc(folder)),
+    "folder": lambda folder: open_recording(write_folder(folder)),
+    "kitti_raw": lambda folder: open_recording(KittiDrive(n=N).write(folder)),
+    "kitti_raw_extract": lambda folder: open_recording(KittiDrive(extract=True, n=N).write(folder)),
+    "rgbd_tum": lambda folder: open_recording(write_tum(folder)),
+    "rgbd_frames": lambda folder: RgbdRecording(write_frames(folder), noise_px=0.25),
+    "real_kitti": real("kitti_straight"),
+    "real_euroc": real("euroc_static"),
+    "bag1": bag1,
+    "bag2": bag2,
+    "bag2_mcap": bag2_mcap,
     "true_poses": lambda folder: TruePoses(mcap(folder)),
+    "selection": lambda folder: Selection(mcap(folder), 0.1, 0.4, 2),
     "subset": lambda folder: Subset(mcap(folder), 1, 6, 2),
     "shuffled": lambda folder: ShuffledPoses(mcap(folder), 7),
 }
+VIEWS = {"true_poses", "subset", "shuffled"}
+"""Read in order alone."""
 
 
 @pytest.fixture(scope="module", params=MAKERS)
@@ -140,3 +180,47 @@ def test_poses_without_images_are_those_of_the_observations(
     recording: Recording, observations: list[Observation]
 ) -> None:
     np.testing.assert_array_equal(poses(recording), [each.T_world_cam for each in observations])
+
+
+@pytest.fixture(scope="module", params=[name for name in MAKERS if name not in VIEWS])
+def file_recording(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> FileRecording:
+    made = MAKERS[request.param](tmp_path_factory.mktemp(request.param))
+    assert isinstance(made, FileRecording)
+    return made
+
+
+def test_its_folder_is_of_one_kind_alone(file_recording: FileRecording) -> None:
+    assert len([name for name, kind in RECORDINGS.items() if kind.recognises(file_recording.path)]) == 1
+
+
+def test_observations_can_be_read_by_number_in_any_order(file_recording: FileRecording) -> None:
+    observations = list(file_recording)
+    numbers = [len(file_recording) - 1, 0, len(file_recording) // 2]
+    for number, read in zip(numbers, file_recording.read(numbers), strict=True):
+        assert read.stamp_s == observations[number].stamp_s == file_recording.stamps_s[number]
+        np.testing.assert_array_equal(read.left, observations[number].left)
+        np.testing.assert_array_equal(read.T_world_cam, observations[number].T_world_cam)
+
+
+def test_observations_carry_disparities_where_the_recording_says_so(file_recording: FileRecording) -> None:
+    carried = {each.disparity is not None for each in file_recording}
+    assert carried == {file_recording.has_disparity}
+    assert Selection(file_recording, stride=2).has_disparity == file_recording.has_disparity
+
+
+def test_true_poses_are_those_of_the_observations(file_recording: FileRecording) -> None:
+    true = file_recording.true_poses()
+    expected = [each.truth.T_world_cam for each in file_recording if each.truth is not None]
+    assert (true is None) == (not expected)
+    if true is not None:
+        np.testing.assert_allclose(true[~np.isnan(true).any(axis=(1, 2))], expected, atol=1e-9)
+
+
+def test_a_part_in_time_holds_what_lies_in_it(file_recording: FileRecording) -> None:
+    observations = list(file_recording)
+    first_s = observations[0].stamp_s
+    middle_s = observations[len(observations) // 2].stamp_s - first_s
+    part = Selection(file_recording, middle_s, None, 2)
+    expected = [each for each in observations if each.stamp_s - first_s >= middle_s][::2]
+    assert [each.stamp_s for each in part] == [each.stamp_s for each in expected]
+    np.testing.assert_array_equal(poses(part), [each.T_world_cam for each in expected])

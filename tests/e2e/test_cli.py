@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 import trimesh
 import typer
+from rgbd_folders import write_frames
 
-from stereogrid import cli, mapping_run
+from experiments import __main__ as experiments
+from stereogrid import cli, map_report
 from stereogrid.camera import StereoCamera
+from stereogrid.commands.chosen import chosen_config
 from stereogrid.config import MappingConfig, load_config, save_config
 from stereogrid.exporting import EXPORTS
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
@@ -21,12 +24,14 @@ from stereogrid.grid import OccupancyGrid
 from stereogrid.matching import MATCHERS
 from stereogrid.motion import Growth, MotionError
 from stereogrid.observation import Observation, Odometry, Truth
+from stereogrid.recording import open_recording
 from stereogrid.recording.mcap import McapWriter
 
 CAMERA = StereoCamera(focal_px=80, cx_px=59.5, cy_px=47.5, baseline_m=0.1, width_px=120, height_px=96)
 HEIGHT_M, WALL_M, SQUARE_M = 0.4, 1.8, 0.02
 T_BASE_CAM = from_rotation(R_BASE_OPTICAL, [0.0, 0.0, HEIGHT_M])
-FILES = {"map.sgrid", "config.toml", "metrics.json", "slice.png", "cubes.png", "disparity.png", "report.html"}
+FIGURES = {"slice.png", "cubes.png", "disparity.png", "trajectory.png"}
+FILES = {"map.sgrid", "config.toml", "run.toml", "metrics.json", "trajectory.tum", "report.html"} | FIGURES
 
 
 def view(T_world_cam, shift_m):
@@ -98,7 +103,7 @@ def test_a_motion_error_from_repeated_runs_takes_the_place_of_the_configs(drive,
     fitted = MotionError(way="linear", along=Growth(1e-3, 0.01), heading=Growth(1e-4, 0.02))
     save_config(fitted, tmp_path / "motion.toml")
     save_config(MappingConfig(motion_error=MotionError(position_m=0.5)), tmp_path / "config.toml")
-    options = ["--config", "config.toml", "--motion", "motion.toml", "--cell", "0.08"]
+    options = ["--config", "config.toml", "--motion", "motion.toml", "--cell", "0.08", "--no-score"]
     done = command("map", drive, *options, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert load_config(MappingConfig, tmp_path / "runs" / "latest" / "config.toml").motion_error == fitted
@@ -126,9 +131,9 @@ def test_mapping_fills_one_run_folder_and_points_latest_at_it(first_run):
     latest = (runs / "latest").resolve()
     assert latest.parent == runs.resolve()
     assert re.fullmatch(r"\d{8}-\d{6}-drive", latest.name)
-    assert {each.name for each in latest.iterdir()} == FILES
+    assert {each.name for each in latest.iterdir()} == FILES | {"reliability.png"}
     assert (cwd / "mine.sgrid").read_bytes() == (latest / "map.sgrid").read_bytes()
-    for name in ("slice.png", "cubes.png", "disparity.png"):
+    for name in FIGURES | {"reliability.png"}:
         assert np.ptp(cv2.imread(str(latest / name))) > 100
 
 
@@ -149,7 +154,40 @@ def test_the_map_holds_the_wall_and_the_floor_where_they_are(first_run):
     assert metrics["command"].startswith("stereogrid map ")
     report = (cwd / "runs" / "latest" / "report.html").read_text()
     assert grid.sha256() in report
-    assert report.count("data:image/png;base64,") == 3
+    assert report.count("data:image/png;base64,") == len(FIGURES) + 1
+    trajectory = np.loadtxt(cwd / "runs" / "latest" / "trajectory.tum")
+    assert trajectory.shape == (4, 8)
+    assert trajectory[:, :4] == pytest.approx(
+        np.array([[10 + 0.1 * n, 0.03 * n, 0.01 * n, HEIGHT_M] for n in range(4)])
+    )
+
+
+def test_a_map_of_a_recording_with_its_truth_is_scored_unless_it_is_not_to_be(first_run, drive, tmp_path, monkeypatch):
+    cwd, done = first_run
+    metrics = json.loads((cwd / "runs" / "latest" / "metrics.json").read_text())
+    assert metrics["scores"]["auc"]["value"] > 0.9
+    assert float(numbers_of(done.stdout)["auc"]) == pytest.approx(metrics["scores"]["auc"]["value"], abs=1e-3)
+    assert "within 3 m" in metrics["scored"]
+    monkeypatch.chdir(tmp_path)
+    options = ["--cell", "0.04", "--range", "3", "--runs"]
+    assert cli.run(cli.app, ["map", str(drive), *options, "bare", "--no-score"]) == 0
+    assert "auc" not in json.loads(Path("bare/latest/metrics.json").read_text())["scores"]
+    assert {each.name for each in Path("bare/latest").iterdir()} == FILES
+
+    # Where the rays cannot be cast, the report says what is missing; who asks for scores is told at once.
+    monkeypatch.setitem(sys.modules, "embreex.mesh_construction", None)
+    assert cli.run(cli.app, ["map", str(drive), *options, "auto"]) == 0
+    assert "pip install stereogrid[score]" in Path("auto/latest/report.html").read_text()
+    assert cli.run(cli.app, ["map", str(drive), *options, "asked", "--score"]) == 1
+    assert list(Path("asked").iterdir()) == []
+
+
+def test_scores_that_are_asked_for_without_a_truth_are_refused_before_anything_is_mapped(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    street = write_kitti(tmp_path / "street")
+    assert cli.run(cli.app, ["map", str(street), "--score"]) == 1
+    assert re.fullmatch(r"error: the recording carries no true mesh .*\n", capfd.readouterr().err)
+    assert not list(Path("runs").iterdir())
 
 
 def test_the_config_of_a_run_repeats_it_to_the_same_map(first_run, drive, tmp_path, monkeypatch, capsys):
@@ -181,9 +219,10 @@ def test_info_says_what_a_recording_and_a_map_hold(first_run, drive, capsys):
     cwd, _ = first_run
     assert cli.run(cli.app, ["info", str(drive)]) == 0
     shown = capsys.readouterr().out
-    assert "4 observations" in shown
-    assert f"path {3 * np.hypot(0.03, 0.01):.2f} m" in shown
-    assert "120" in shown
+    assert f"mcap: 4 observations in 0.300 s (10.00 Hz), path {3 * np.hypot(0.03, 0.01):.2f} m" in shown
+    assert "camera: 120 x 96 px, focal length 80.00 px (73 degrees wide), centre (59.50, 47.50) px" in shown
+    assert f"mount: left camera in base at (0.000, 0.000, {HEIGHT_M:.3f}) m" in shown
+    assert "truth: poses of 4 observations, mesh" in shown
     assert cli.run(cli.app, ["info", str(cwd / "mine.sgrid")]) == 0
     shown = capsys.readouterr().out
     assert f"{OccupancyGrid.load(cwd / 'mine.sgrid').n_known:,} known cells" in shown
@@ -242,10 +281,68 @@ def test_a_kitti_folder_is_known_from_its_path(tmp_path, monkeypatch, capsys):
     assert "camera_height_m" in capsys.readouterr().out
 
 
+def test_measured_depths_are_mapped_as_they_are_unless_a_matcher_is_named(tmp_path, monkeypatch, capsys):
+    folder = write_frames(tmp_path / "room", n=2)
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["map", str(folder), "--cell", "0.1"]) == 0
+    assert load_config(MappingConfig, "runs/latest/config.toml").matcher.name == "recorded"
+    assert json.loads(Path("runs/latest/metrics.json").read_text())["scores"]["disparity_density"]["value"] > 0.99
+    recording = open_recording(folder)
+    assert chosen_config(recording.camera, None, recording=recording, matcher="sgbm").matcher.name == "sgbm"
+    assert (
+        chosen_config(recording.camera, Path("runs/latest/config.toml"), recording=recording).matcher.name == "recorded"
+    )
+    assert cli.run(cli.app, ["info", str(folder)]) == 0
+    assert "virtual rig of 0.06 m" in capsys.readouterr().out
+
+
 def test_the_default_config_can_be_written_and_used(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.run(cli.app, ["config", "my.toml"]) == 0
     assert load_config(MappingConfig, "my.toml") == MappingConfig()
+
+
+def test_a_config_is_printed_written_made_for_a_camera_and_checked(drive, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["config"]) == 0
+    printed = capsys.readouterr().out
+    assert "# Edge of a cell. [m; positive]\ncell_m = 0.05\n" in printed
+    assert cli.run(cli.app, ["config", "my.toml"]) == 0
+    assert Path("my.toml").read_text() == printed
+    assert cli.run(cli.app, ["config", "suits.toml", "--for", str(drive)]) == 0
+    assert load_config(MappingConfig, "suits.toml") == MappingConfig.for_camera(CAMERA)
+    assert "[m; positive; default 8.0]\nmax_range_m = 1.63" in Path("suits.toml").read_text()
+    assert cli.run(cli.app, ["config", "--check", "my.toml"]) == 0
+    assert capsys.readouterr().out == "my.toml: written\nsuits.toml: written\nmy.toml: fine\n"
+    Path("my.toml").write_text(printed.replace("cell_m = 0.05", "cell_m = 0"))
+    assert cli.run(cli.app, ["config", "--check", "my.toml"]) == 1
+    assert capsys.readouterr().err == "error: my.toml: grid.cell_m must be positive and finite, not 0.0\n"
+
+
+def test_the_config_of_an_experiment_is_printed_too(capsys):
+    assert cli.run(experiments.app, ["config", "outdoor"]) == 0
+    assert '[corridor, entrance, office, outdoor, warehouse]\nworld = "outdoor"\n' in capsys.readouterr().out
+    assert cli.run(experiments.app, ["config", "indoor"]) == 1
+    assert (
+        "no experiment with a config named 'indoor'; did you mean 'outdoor'? choose from: budget, "
+        in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("grid.cel_m=0.1", "unknown key 'grid.cel_m'; did you mean 'cell_m'?"),
+        ("grid.cell_m=-1", "grid.cell_m must be positive and finite, not -1.0"),
+        ("grid.cell_m", "'grid.cell_m': expected section.key=value, as in grid.cell_m=0.1"),
+        ("matcher.name=sgmb", "no matcher.name named 'sgmb'; did you mean 'sgbm'?"),
+    ],
+)
+def test_a_wrong_setting_is_refused_before_anything_is_mapped(drive, tmp_path, monkeypatch, capsys, setting, said):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(cli.app, ["map", str(drive), "--set", setting]) == 1
+    assert said in capsys.readouterr().err
+    assert not Path("runs").exists()
 
 
 def test_the_help_of_map_names_every_matcher(capsys):
@@ -254,7 +351,7 @@ def test_the_help_of_map_names_every_matcher(capsys):
     assert all(re.search(rf"\b{name}\b", shown) for name in MATCHERS)
 
 
-COMMANDS = ("map", "score", "info", "export", "config")
+COMMANDS = ("map", "score", "info", "trajectory", "export", "config")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
@@ -363,7 +460,7 @@ BAD_INPUT = {
         kitti(replace_line("calib.txt", 1, P_RIGHT.format("-8")[:-2])),
         r"calib\.txt:2: 11 numbers, expected 12",
     ),
-    "images of different size": (kitti(crop_right), r"000001\.png: the image is \(96, 119\)"),
+    "images of different size": (kitti(crop_right), r"000001\.png: the image is 119 x 96 px"),
     "a pose with a NaN": (kitti(replace_line("poses.txt", 1, pose_row(_3="nan"))), r"poses\.txt:2: .*NaN"),
     "a pose that is not rigid": (kitti(replace_line("poses.txt", 2, pose_row(_0=1.1))), r"poses\.txt:3: .*not rigid"),
     "a mirrored pose": (kitti(replace_line("poses.txt", 0, pose_row(_0=-1))), r"poses\.txt:1: .*not rigid"),
@@ -414,13 +511,20 @@ BAD_INPUT = {
     ),
     "an unknown matcher": (
         line("map", "DRIVE", "--matcher", "sgmb"),
-        "no matcher named 'sgmb'; choose from: bm, .*sgbm",
+        r"no matcher named 'sgmb'; did you mean 'sgbm'\? choose from: bm, .*sgbm",
+    ),
+    "disparities that the recording does not carry": (
+        line("map", "DRIVE", "--matcher", "recorded"),
+        r"drive\.mcap: carries no disparities of its own, .*'recorded'; choose from: bm, gc",
     ),
     "disparities that are no multiple of 16": (line("map", "DRIVE", "--num-disparities", "13"), "num_disparities .*13"),
     "more disparities than columns": (line("map", "DRIVE", "--num-disparities", "128"), "120x96 px is too small"),
     "an unknown source of poses": (line("map", "DRIVE", "--poses", "gps"), "'gps'"),
     "an out in no folder": (line("map", "DRIVE", "--out", "nowhere/map.sgrid"), "nowhere: no such folder"),
-    "an out that is a folder": (line("map", "DRIVE", "--out", "."), r"error: \.: .*folder"),
+    "an out that is a folder": (
+        lambda folder, drive: [(folder / "a.sgrid").mkdir() or "map", drive, "--out", "a.sgrid"],
+        "a.sgrid: is a folder",
+    ),
     "an out that cannot be written": (line("map", "DRIVE", "--out", "/proc/map.sgrid"), r"/proc/map\.sgrid: cannot be"),
     "runs that are a file": (
         text_file("file", "", "map", "DRIVE", "--runs", "file"),
@@ -487,7 +591,7 @@ def test_in_a_process_of_its_own_bad_input_ends_with_exit_code_1(drive, tmp_path
 
 def test_a_run_that_fails_half_way_leaves_no_hidden_folder(drive, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(mapping_run, "write_report", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(map_report, "write_report", lambda *a, **k: (_ for _ in ()).throw(KeyboardInterrupt))
     try:
         code = cli.run(cli.app, ["map", str(drive), "--cell", "0.05", "--out", "mine.sgrid"])
     except KeyboardInterrupt:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import re
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("pybullet", reason="the simulated drive needs pybullet (Python 3.10 or 3.11)")
+
+from reports import stands_alone
 
 from experiments.corridor import IDEAL, NOISY, SHUFFLED, TRUE_DEPTH, CorridorConfig, run
 from stereogrid.config import GridConfig, MappingConfig, MatcherConfig, load_config
@@ -78,7 +79,7 @@ def test_the_run_folder_holds_everything_and_its_report_stands_alone(whole_run):
     assert grid.sha256() == outcomes[IDEAL].mapped.grid.sha256()
     assert {"slice.png", "cubes.png", "disparity.png", "reliability-ideal.png"} <= {p.name for p in folder.iterdir()}
     report = (folder / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:)', report)
+    assert stands_alone(report)
     assert report.count("data:image/png;base64,") == len(list(folder.glob("*.png")))
 
 

@@ -190,8 +190,8 @@ def test_a_client_drives_over_a_terminal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("corridr", "--port", "0"), "no world named 'corridr'; choose from: corridor"),
-        (("corridor", "--subclass", "p2at"), "no robot named 'p2at'; choose from: p3at, p3at-sh"),
+        (("corridr", "--port", "0"), "no world named 'corridr'; did you mean 'corridor'? choose from: corridor"),
+        (("corridor", "--subclass", "p2at"), "no robot named 'p2at'; did you mean 'p3at'? choose from: p3at, p3at-sh"),
         (("corridor", "--port", "70000"), "a port must be 0 to 65535, not 70000"),
         (("corridor", "--camera", "--fps", "0"), "pictures a second must be more than 0 and at most 120, not 0.0"),
         (("corridor", "--port", "0", "--battery", "40"), "a battery's voltage must be"),

@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("pybullet", reason="the simulated drive needs pybullet (Python 3.10 or 3.11)")
 
+from reports import stands_alone
+
 from experiments.__main__ import app
 from experiments.drives import HEADLINE, DriveConfig
 from experiments.matchers import MatchersConfig, default_pairs
@@ -136,7 +138,7 @@ def test_the_run_folder_can_be_read_back_and_its_report_stands_alone(finished):
         assert np.nanmedian(found["disparity_px"]) == pytest.approx(SHIFT_PX, abs=0.3)
         assert found["sigma_px"].shape == (90, 160)
     report = (latest / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:)', report)
+    assert stands_alone(report)
     pictures = {path.name for path in latest.glob("*.png")}
     assert pictures == {
         *("pairs-quality-time.png", "panels-plane.png", "panels-wide-by-2.png"),

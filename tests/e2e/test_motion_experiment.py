@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip("pybullet", reason="the simulated robot needs pybullet (Python 3.10 or 3.11)")
 
+from reports import stands_alone
+
 from experiments.__main__ import app
 from experiments.motion import MotionConfig
 from experiments.motion_course import WAYS, drawn_faults, drive, faulty_runs
@@ -54,7 +56,7 @@ def test_every_set_and_parameter_is_in_the_tidy_file_beside_what_was_injected(fi
 
 def test_the_report_stands_alone(finished):
     report = (finished / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:)', report)
+    assert stands_alone(report)
     assert report.count("data:image/png;base64,") == len(list(finished.glob("*.png"))) == 3
     assert "| along b | 1 | 0.01 |" in (finished / "tables.md").read_text()
 

@@ -8,6 +8,7 @@ import pytest
 
 from stereogrid import cli
 from stereogrid.camera import StereoCamera
+from stereogrid.commands import chosen
 from stereogrid.config import MappingConfig, MatcherConfig, load_config
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
@@ -81,7 +82,7 @@ def test_what_does_not_go_together_gets_one_line(drive, tmp_path, monkeypatch, c
 
 def test_another_matcher_on_the_command_line_does_not_keep_the_networks_file():
     held = MatcherConfig("onnx", 48, "/nets/net.toml")
-    assert cli._chosen_matcher(held, "bm", None, None) == MatcherConfig("bm", 48)
-    assert cli._chosen_matcher(held, "onnx", None, 64) == MatcherConfig("onnx", 64, "/nets/net.toml")
-    assert cli._chosen_matcher(held, None, None, None) == held
-    assert cli._chosen_matcher(MatcherConfig(), None, Path("/nets/net.toml"), None).name == "onnx"
+    assert chosen._chosen_matcher(held, "bm", None, None) == MatcherConfig("bm", 48)
+    assert chosen._chosen_matcher(held, "onnx", None, 64) == MatcherConfig("onnx", 64, "/nets/net.toml")
+    assert chosen._chosen_matcher(held, None, None, None) == held
+    assert chosen._chosen_matcher(MatcherConfig(), None, Path("/nets/net.toml"), None).name == "onnx"

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 
 pytest.importorskip("pybullet", reason="the simulated drive needs pybullet (Python 3.10 or 3.11)")
 
+from reports import stands_alone
 from small_drives import SMALL, small_drive
 
 from experiments.__main__ import app
@@ -86,7 +86,7 @@ def test_no_cell_of_a_real_map_has_a_probability_by_eq2_as_printed(finished):
 
 def test_the_report_stands_alone_and_the_run_can_be_read_back(finished):
     report = (finished / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:)', report)
+    assert stands_alone(report)
     assert report.count("data:image/png;base64,") == 1
     assert load_config(PrintedConfig, finished / "config.toml") == CONFIG
 

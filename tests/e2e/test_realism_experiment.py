@@ -10,6 +10,8 @@ from drawn_pairs import shifted_pair
 
 pytest.importorskip("pybullet", reason="the simulated drive needs pybullet (Python 3.10 or 3.11)")
 
+from reports import stands_alone
+
 from experiments.__main__ import app
 from experiments.realism import RealismConfig
 from experiments.realism_measures import MEASURES
@@ -62,7 +64,7 @@ def test_worse_cameras_match_less_and_see_two_shades(finished):
 def test_the_report_stands_alone_and_what_was_missing_is_said(finished):
     assert load_config(RealismConfig, finished / "config.toml") == CONFIG
     report = (finished / "report.html").read_text()
-    assert not re.search(r'(?:src|href)="(?!data:)', report)
+    assert stands_alone(report)
     assert report.count("data:image/png;base64,") == len(list(finished.glob("*.png"))) == 2
     assert "kitti_straight was not under --data" in report
     assert "| teddy | real | 1 |" in (finished / "tables.md").read_text()

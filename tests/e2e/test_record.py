@@ -111,7 +111,7 @@ def test_a_robot_that_is_pushed_is_recorded_raw_and_read_rectified_where_it_was(
     np.testing.assert_allclose(last.T_world_cam, last.odometry.T_odom_base @ RIG.T_base_cam, atol=1e-9)
     assert run(stereogrid, ["info", str(out)]) == 0
     told = capsys.readouterr().out
-    assert f"RawMcapRecording: {len(recording)} observations" in told and "calibration.toml: # Two cameras" in told
+    assert f"mcap: {len(recording)} observations in " in told and "calibration.toml: # Two cameras" in told
     with AnyReader([out]) as bag:
         assert all(bag.deserialize(data, connection.msgtype) for connection, _, data in bag.messages())
 

@@ -267,6 +267,17 @@ def test_a_calibration_that_cannot_be_is_refused_with_the_reason(rig, changes, r
         Rectification.from_calibration(*(given_rig[k] for k in ("K", "distortion", "T_right_left")), (640, 480))
 
 
+@pytest.mark.parametrize("size_px", [(0, 480), (640, 8193), (-640, 480), (10**12, 10**12)])
+def test_pictures_of_no_size_or_one_beyond_all_cameras_are_not_rectified(rig, size_px):
+    reason = f"pictures of {size_px[0]} x {size_px[1]} px; 1 to 8192 px a side can be rectified"
+    with pytest.raises(InvalidInputError, match=reason):
+        Rectification.from_calibration(rig.K, rig.distortion, rig.T_right_left, size_px)
+    still, none = (np.eye(3),) * 2, (np.zeros(5),) * 2
+    for size, raw_shape in ((size_px, None), ((640, 480), size_px[::-1])):
+        with pytest.raises(InvalidInputError, match=reason):
+            Rectification.from_matrices(rig.K, none, still, MINORU.P, size, raw_shape)
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_rectify_refuses_an_image_of_another_size_by_side(rectification, side):
     images = {"left": np.zeros((480, 640), np.uint8), "right": np.zeros((480, 640), np.uint8)}
@@ -359,3 +370,15 @@ def test_real_chessboards_measured_in_3d_have_square_fields_of_one_size(chessboa
     edges = np.concatenate([np.linalg.norm(np.diff(corners, axis=axis), axis=-1).ravel() for axis in (1, 2)])
     assert edges.mean() == pytest.approx(1, abs=0.01)
     assert edges.std() <= 0.025
+
+
+def test_raw_images_may_be_larger_than_rectified_ones_and_no_others_are_taken():
+    K = MINORU.K + np.outer([20, 12, 0], [0, 0, 1])
+    raw = np.random.default_rng(0).integers(0, 256, (510, 690), dtype=np.uint8)
+    none, still = np.zeros(4), np.eye(3)
+    made = Rectification.from_matrices((K, K), (none, none), (still, still), MINORU.P, (640, 480), raw.shape)
+    assert made.camera == MINORU
+    for out in made.rectify(raw, raw):
+        np.testing.assert_array_equal(out, raw[12:492, 20:660])
+    with pytest.raises(InvalidInputError, match=r"the left image is \(480, 640\), the calibration \(510, 690\)"):
+        made.rectify(*made.rectify(raw, raw))

@@ -17,10 +17,12 @@ from stereogrid.config import (
     save_config,
 )
 from stereogrid.errors import ConfigError, InvalidInputError
+from stereogrid.matching import MATCHERS
 from stereogrid.matching.correlation import temporal_share
 from stereogrid.motion import Growth, MotionError
 from stereogrid.observation import Disparity
 from stereogrid.sensor_model import SensorModel
+from stereogrid.tomlfile import with_settings
 
 MINORU = StereoCamera(focal_px=834, cx_px=319.5, cy_px=239.5, baseline_m=0.06, width_px=640, height_px=480)
 KITTI = StereoCamera(focal_px=707.0912, cx_px=601.8873, cy_px=183.1104, baseline_m=0.5372, width_px=1226, height_px=370)
@@ -28,7 +30,7 @@ KITTI = StereoCamera(focal_px=707.0912, cx_px=601.8873, cy_px=183.1104, baseline
 positive = st.floats(1e-6, 1e6)
 configs = st.builds(
     MappingConfig,
-    matcher=st.builds(MatcherConfig, name=st.text(max_size=8), num_disparities=st.integers(-(2**40), 2**40)),
+    matcher=st.builds(MatcherConfig, name=st.sampled_from(sorted(MATCHERS)), num_disparities=st.integers(1, 2**40)),
     model=st.builds(
         SensorModel,
         p_free=st.floats(0.01, 0.4),
@@ -88,8 +90,13 @@ def test_a_whole_number_will_do_where_a_float_is_expected(tmp_path):
         ("grid = 0.1\n", "'grid' must be a section, not 0.1"),
         ("[[grid]]\ncell_m = 0.1\n", "'grid' must be a section, not [{'cell_m': 0.1}]"),
         ("[model]\np_free = 0.7\n", "[model] expected 0 < p_free < prior < p_occupied < 1, not p_free 0.7"),
-        ('[model]\nform = "print"\n', "[model] no form of the sensor model named 'print'; choose from: corrected"),
-        ("[motion_error.along]\na = -1\n", "[motion_error.along] a must be >= 0 and finite, not -1.0"),
+        ("[model]\np_free = 1\n", "model.p_free must be > 0 and < 1 and finite, not 1.0"),
+        ('[model]\nform = "print"\n', "no model.form named 'print'; did you mean 'printed'? choose from: corrected"),
+        ('[matcher]\nname = "sgmb"\n', "no matcher.name named 'sgmb'; did you mean 'sgbm'? choose from: bm"),
+        ("[motion_error.along]\na = -1\n", "motion_error.along.a must be >= 0 and finite, not -1.0"),
+        ("[grid]\ncell_m = 0\n", "grid.cell_m must be positive and finite, not 0.0"),
+        ("[grid]\nmemory_limit_gb = inf\n", "grid.memory_limit_gb must be positive and finite, not inf"),
+        ("[matcher]\nnum_disparities = 0\n", "matcher.num_disparities must be positive, not 0"),
         ("[grid\n", "at line 1"),
     ],
 )
@@ -125,6 +132,47 @@ def test_sections_within_sections_are_named_by_their_whole_path(tmp_path):
     outer = Outer(MappingConfig.for_camera(KITTI), seed=3)
     save_config(outer, tmp_path / "outer.toml")
     assert load_config(Outer, tmp_path / "outer.toml") == outer
+
+
+def test_an_error_of_the_whole_names_no_section(tmp_path):
+    @dataclass(frozen=True)
+    class Odd:
+        number: int = 1
+
+        def __post_init__(self):
+            if self.number % 2 == 0:
+                raise InvalidInputError(f"number must be odd, not {self.number}")
+
+    (tmp_path / "odd.toml").write_text("number = 2")
+    with pytest.raises(ConfigError, match=r"odd\.toml: number must be odd, not 2$"):
+        load_config(Odd, tmp_path / "odd.toml")
+
+
+@pytest.mark.parametrize(
+    ("setting", "found"),
+    [
+        ("grid.cell_m=0.3", lambda c: c.grid.cell_m == 0.3),
+        (" grid.cell_m = 2 ", lambda c: c.grid.cell_m == 2.0),
+        ("grid.cell_m=.5", lambda c: c.grid.cell_m == 0.5),
+        ("matcher.name=sgbm", lambda c: c.matcher.name == "sgbm"),
+        ('matcher.name="sgbm"', lambda c: c.matcher.name == "sgbm"),
+        ("grid.clamp=[-1, 2.5]", lambda c: c.grid.clamp == (-1.0, 2.5)),
+        ("motion_error.along.a=1e-3", lambda c: c.motion_error.along.a == 0.001),
+        ('motion_error={way="pose", kappa=2}', lambda c: (c.motion_error.way, c.motion_error.kappa) == ("pose", 2.0)),
+    ],
+)
+def test_a_setting_changes_its_parameter_and_no_other(setting, found):
+    config = MappingConfig.for_camera(KITTI)
+    changed = with_settings(config, [setting])
+    assert found(changed) and not found(config)
+    same = {"matcher", "model", "motion_error", "grid"} - {setting.strip().partition(".")[0].partition("=")[0]}
+    assert all(getattr(changed, name) == getattr(config, name) for name in same)
+
+
+@pytest.mark.parametrize("setting", ["x\ny=1", "grid.cell_m=1\n[model]", "=3", "grid.=1", "grid.cell_m.x=1", "a.b.c=1"])
+def test_a_setting_that_is_none_is_refused(setting):
+    with pytest.raises(ConfigError):
+        with_settings(MappingConfig(), [setting])
 
 
 def test_defaults_suit_the_minoru():
@@ -196,8 +244,22 @@ def test_a_mapper_weighs_by_the_reach_of_its_matchers_errors():
 
 
 def test_a_mapper_of_an_unknown_matcher_is_refused_with_the_choices():
-    with pytest.raises(InvalidInputError, match="no matcher named 'sgmb'; choose from: bm"):
+    with pytest.raises(InvalidInputError, match=r"no matcher named 'sgmb'; did you mean 'sgbm'\? choose from: bm"):
         MappingConfig(matcher=MatcherConfig("sgmb")).build_mapper(MINORU)
+
+
+def test_recorded_stands_for_no_matcher():
+    config = MatcherConfig("recorded")
+    assert MappingConfig(matcher=config).build_mapper(MINORU).matcher is None
+    with pytest.raises(
+        InvalidInputError, match=r"'recorded' matches no images; .* choose from: bm, gc, kz2, onnx, sgbm$"
+    ):
+        config.build()
+    with pytest.raises(
+        InvalidInputError,
+        match=r"no matcher named 'recordet'; did you mean 'recorded'\? choose from: .*, recorded, sgbm$",
+    ):
+        MatcherConfig("recordet").build()
 
 
 def test_saving_into_a_folder_that_is_not_there_is_refused(tmp_path):

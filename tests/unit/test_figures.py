@@ -10,8 +10,17 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from stereogrid.errors import InvalidInputError
-from stereogrid.figures import cubes_figure, disparity_figure, figure_png, reliability_figure, save_figure, slice_figure
-from stereogrid.figures.cubes import FRUSTUM_COLOUR, GROUND_COLOUR, eye_behind, frustum_lines_m, look_at
+from stereogrid.figures import (
+    cubes_figure,
+    disparity_figure,
+    figure_png,
+    reliability_figure,
+    save_figure,
+    slice_figure,
+    trajectory_figure,
+)
+from stereogrid.figures.colours import PATH_COLOUR
+from stereogrid.figures.cubes import GROUND_COLOUR, eye_behind, frustum_lines_m, look_at
 from stereogrid.figures.slices import UNKNOWN_COLOUR
 from stereogrid.geometry import R_BASE_OPTICAL, as_pose, from_rotation, from_yaw, inverse, transform
 from stereogrid.grid import OccupancyGrid
@@ -154,7 +163,7 @@ def test_obstacles_are_blue_the_ground_is_grey_and_what_is_too_high_is_left_out(
 def test_the_camera_is_a_red_frustum_at_its_pose():
     figure = cubes_figure(grid_of([[20, 0, 0]]), FORWARD, CAMERA, path_m=PATH)
     lines = collection(figure, LineCollection)
-    assert all(to_rgb(each.get_color()[0][:3]) == to_rgb(FRUSTUM_COLOUR) for each in lines)
+    assert all(to_rgb(each.get_color()[0][:3]) == to_rgb(PATH_COLOUR) for each in lines)
     T = from_yaw(0.3, [1, 2, 3]) @ FORWARD
     edges = frustum_lines_m(CAMERA, T, depth_m=0.5)
     in_cam = transform(inverse(T), edges)
@@ -260,3 +269,27 @@ def test_the_same_map_gives_the_same_png_bytes(name, tmp_path):
 def test_a_figure_for_a_folder_that_does_not_exist_is_refused(tmp_path):
     with pytest.raises(InvalidInputError, match="nowhere"):
         save_figure(MAKERS["disparity"](), tmp_path / "nowhere" / "figure.png")
+
+
+def test_the_trajectory_shows_the_claimed_way_beside_the_true_one_in_metres() -> None:
+    path_m = np.stack([np.linspace(0, 4, 9), np.zeros(9), np.full(9, 0.4)], axis=1)
+    true_m = path_m + np.array([0.0, 0.3, 0.4])
+    true_m[4] = np.nan
+    above, height, error = trajectory_figure(path_m, true_path_m=true_m).axes
+    lines = {line.get_label(): np.asarray(line.get_xydata()) for line in above.lines}
+    assert np.array_equal(lines["claimed"], path_m[:, :2]) and np.array_equal(lines["start"], path_m[:1, :2])
+    assert above.get_aspect() == 1
+    assert [axes.get_xlabel() for axes in (above, error)] == ["x (world) [m]", "way [m]"]
+    way_m, off_m = np.asarray(error.lines[0].get_xydata()).T
+    assert way_m[-1] == pytest.approx(4.0)
+    assert off_m[~np.isnan(off_m)] == pytest.approx(0.5) and np.isnan(off_m[4])
+    assert len(height.lines) == 2
+
+
+def test_a_level_way_is_no_mountain_and_without_a_truth_no_error_is_drawn() -> None:
+    path_m = np.stack([np.linspace(0, 4, 9), np.zeros(9), 0.4 + 1e-4 * np.arange(9)], axis=1)
+    for true_m in (None, np.full((9, 3), np.nan)):
+        _, height = trajectory_figure(path_m, true_path_m=true_m).axes
+        assert np.ptp(height.get_ylim()) >= 0.2
+    with pytest.raises(InvalidInputError, match="no way"):
+        trajectory_figure(path_m[:1])

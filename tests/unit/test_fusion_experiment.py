@@ -9,7 +9,7 @@ import pytest
 
 from experiments.fusion import FusionConfig, compare_real
 from experiments.fusion_arms import CLAMPS, OF_INDEPENDENT, OF_MATCHERS, Arm
-from experiments.fusion_room import RoomConfig, compare_in_room, nearly_rigid, noisy, read_depths
+from experiments.fusion_room import RoomConfig, compare_in_room, noisy, read_depths
 from experiments.fusion_street import StreetConfig, compare_on_street
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import RecordingError, StereogridError
@@ -126,13 +126,6 @@ def test_a_pose_that_is_none_is_named(tmp_path, pose):
     path.write_text(pose)
     with pytest.raises(RecordingError, match=r"frame-000000\.pose\.txt"):
         list(read_depths(tmp_path / "frames"))
-
-
-def test_a_rounded_rotation_is_made_one_and_the_position_stays():
-    T = from_yaw(0.5, [1, 2, 3])
-    rounded = np.round(T, 3)
-    made = nearly_rigid(rounded, None)
-    assert made == pytest.approx(T, abs=1e-3) and (made[:3, 3] == [1, 2, 3]).all()
 
 
 def test_a_depth_image_that_is_none_is_named(tmp_path):

@@ -15,6 +15,7 @@ from stereogrid.geometry import (
     from_rotation,
     from_yaw,
     inverse,
+    nearest_pose,
     quaternion_wxyz,
     rotation_angle_rad,
     transform,
@@ -157,6 +158,25 @@ def test_a_checked_pose_does_not_change_with_the_callers_array():
 
 def test_an_unknown_name_is_answered_with_the_choices_in_order():
     error = unknown_name("matcher", "sgmb", ["sgbm", "bm"])
-    assert str(error) == "no matcher named 'sgmb'; choose from: bm, sgbm"
+    assert str(error) == "no matcher named 'sgmb'; did you mean 'sgbm'? choose from: bm, sgbm"
     assert isinstance(error, StereogridError)
     assert isinstance(error, ValueError)
+
+
+def test_a_rounded_rotation_is_made_one_and_the_position_stays():
+    T = from_yaw(0.5, [1, 2, 3])
+    for rounded in (np.round(T, 3), np.round(T, 3)[:3]):
+        made = nearest_pose(rounded)
+        np.testing.assert_allclose(made, T, atol=1e-3)
+        np.testing.assert_allclose(made[:3, :3] @ made[:3, :3].T, np.eye(3), atol=1e-12)
+        assert (made[:3, 3] == [1, 2, 3]).all()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [np.diag([1, 1, 1.05, 1]), np.diag([-1, 1, 1, 1]), np.full((4, 4), np.nan), np.eye(3), np.diag([1, 1, 1, 2])],
+    ids=["stretched", "mirrored", "nan", "no position", "last row"],
+)
+def test_what_no_rounding_explains_is_refused(wrong):
+    with pytest.raises(InvalidInputError, match="the mount"):
+        nearest_pose(wrong, "the mount")

@@ -78,7 +78,13 @@ def test_numbers_have_three_digits():
 
 def test_a_run_leaves_json_csv_tables_and_figure(bench_json, tmp_path):
     folder, _ = run(bench_json, runs=tmp_path / "runs", picture=tmp_path / "picture.png")
-    assert {path.name for path in folder.iterdir()} == {"bench.json", "bench.csv", "tables.md", "grid-bench.png"}
+    assert {path.name for path in folder.iterdir()} == {
+        "bench.json",
+        "bench.csv",
+        "tables.md",
+        "grid-bench.png",
+        "run.toml",
+    }
     assert read_rows(folder / "bench.json") == ROWS
     with (folder / "bench.csv").open(newline="") as file:
         assert [line["kind"] for line in csv.DictReader(file)] == [plain(row)["kind"] for row in ROWS]

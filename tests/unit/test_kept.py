@@ -6,7 +6,7 @@ import math
 import pytest
 
 from experiments import kept
-from experiments.claim_units import CODE, NOT_CODE
+from experiments.claim_units import CODE
 from experiments.kept import KeptScores, code_key, key_of
 from stereogrid.errors import InvalidInputError
 from stereogrid.motion import Growth, MotionError
@@ -70,4 +70,4 @@ def test_the_key_of_a_unit_of_the_claim_is_of_all_the_code_of_the_experiments_th
             if isinstance(node, ast.ImportFrom) and node.level == 1:
                 used.add(f"experiments/{node.module}.py")
     assert used - named == {"experiments/kept.py", "experiments/parallel.py"}
-    assert all((kept.ROOT / each).exists() for each in (*CODE, *NOT_CODE))
+    assert all((kept.ROOT / each).exists() for each in (*CODE, *kept.NO_SCORE_DEPENDS_ON))

@@ -55,6 +55,23 @@ def test_a_step_fuses_what_the_matcher_found_at_the_claimed_pose_and_returns_it(
     assert mapper.grid.sha256() == by_hand.sha256()
 
 
+def test_without_a_matcher_the_observations_own_disparities_are_fused():
+    made = disparities(2)
+    mapper, by_hand = (Mapper(CAMERA, matcher, OccupancyGrid(0.1, model=MODEL)) for matcher in (None, Scripted(made)))
+    for n, disparity in enumerate(made):
+        assert mapper.step(replace(observation(n), disparity=disparity)) is disparity
+        by_hand.step(observation(n))
+    assert mapper.grid.sha256() == by_hand.grid.sha256()
+    with pytest.raises(InvalidInputError, match=r"the observation at 2\.0 s carries no disparity: give a matcher"):
+        mapper.step(observation(2))
+
+
+def test_a_matchers_disparity_comes_before_the_observations_own():
+    found, own = disparities(2)
+    mapper = Mapper(CAMERA, Scripted([found]), OccupancyGrid(0.1, model=MODEL))
+    assert mapper.step(replace(observation(0), disparity=own)) is found
+
+
 def test_eps_comes_from_the_distance_travelled():
     motion = MotionError(along=Growth(0.01, 0.05), kappa=2.0)
     disparity = constant_disparity(4.0, 0.1)

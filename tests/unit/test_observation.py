@@ -25,11 +25,15 @@ def observation(**changes):
     ("changes", "reason"),
     [
         ({"left": np.zeros((4, 6))}, r"the left image must be \(H, W\) uint8, not \(4, 6\) float64"),
-        ({"right": np.zeros((4, 6, 3), np.uint8)}, r"the right image must be \(H, W\) uint8, not \(4, 6, 3\) uint8"),
+        (
+            {"right": np.zeros((4, 6, 3), np.uint8)},
+            r"the right image must be \(H, W\) uint8, not \(4, 6, 3\) uint8; make it grey first",
+        ),
         ({"left": [[0, 1]]}, r"the left image must be \(H, W\) uint8, not list"),
         ({"right": np.zeros((4, 5), np.uint8)}, r"differ in size: \(4, 6\) and \(4, 5\)"),
         ({"stamp_s": np.nan}, "stamp_s must be finite, not nan"),
         ({"T_world_cam": NOT_RIGID}, "T_world_cam is not rigid"),
+        ({"disparity": Disparity(np.ones((4, 5)), 0.1)}, r"the disparity is \(4, 5\), the images are \(4, 6\)"),
         ({"T_world_cam": np.full((4, 4), np.nan)}, "T_world_cam contains NaN"),
     ],
 )

@@ -3,15 +3,25 @@
 import base64
 import json
 import re
+from dataclasses import dataclass, field
+from datetime import datetime
 from html.parser import HTMLParser
+from typing import Annotated
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from stereogrid.config import MappingConfig, save_config
+from stereogrid.described import Doc
 from stereogrid.report import ReportFigure, environment, format_score, score_table, write_metrics, write_report
-from stereogrid.scoring import SCORE_NAMES, Score, scores_to_dict
+from stereogrid.run_record import RunRecord
+from stereogrid.runs import begun, run_folder
+from stereogrid.scoring import BOUND_NAMES, SCORE_NAMES, Score, scores_to_dict
+from stereogrid.scoring.held_out import HELD_OUT_NAMES
+from stereogrid.scoring.meanings import MEANINGS
 
 SCORES = [
     Score("camera_height_m", 1.6512, "m", 100),
@@ -72,10 +82,24 @@ def test_the_report_refers_to_nothing_outside_itself(tmp_path):
     page = Page(text)
     assert not re.search(r"https?:|file:|//\w|url\(|@import", text)
     assert not {"script", "link", "iframe", "object", "embed"} & set(page.tags)
-    links = [value for _, name, value in page.attributes if name in ("src", "href", "srcset", "data")]
-    assert len(links) == 1
-    assert all(link.startswith("data:image/png;base64,") for link in links)
-    assert base64.b64decode(links[0].split(",", 1)[1]) == PNG
+    loaded = [value for _, name, value in page.attributes if name in ("src", "srcset", "data")]
+    assert len(loaded) == 1
+    assert loaded[0].startswith("data:image/png;base64,")
+    assert base64.b64decode(loaded[0].split(",", 1)[1]) == PNG
+    policy = next(value for tag, name, value in page.attributes if tag == "meta" and value.startswith("default-src"))
+    assert policy.startswith("default-src 'none'; img-src data:;")
+
+
+def test_the_files_of_the_run_are_linked_beside_the_page_whatever_their_names(tmp_path):
+    names = ["map.sgrid", "metrics.json", 'a "b" <i>#?%.csv', "results.md"]
+    for name in names:
+        (tmp_path / name).write_text("x" * 1500)
+    (tmp_path / ".half-written").write_text("x")
+    page = Page(write(tmp_path))
+    links = [value for tag, name, value in page.attributes if tag == "a" and name == "href"]
+    assert all(link.startswith("./") for link in links)
+    assert sorted(unquote(link.removeprefix("./")) for link in links) == sorted(names)
+    assert set(names) <= set(page.texts) and "2 kB" in page.texts
 
 
 def test_the_report_reads_the_same_when_its_figures_are_gone(tmp_path):
@@ -153,6 +177,78 @@ def test_the_config_is_quoted_where_there_is_one_and_the_versions_are_named(tmp_
     for name in ("stereogrid", "numpy", "numba", "opencv"):
         assert name in environment()["versions"]
     assert environment()["versions"] in text
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a drive is."""
+
+    longest: Annotated[float, Doc("How long.", "m")] = 6.0
+    share_m: Annotated[float, Doc("A number without a dimension, whatever its name ends with.", "1")] = 0.5
+
+
+@dataclass(frozen=True)
+class Documented:
+    """A config with all that configs have."""
+
+    world_seed: Annotated[int, Doc("Paints.")] = 7
+    mapping: Annotated[MappingConfig, Doc("How.")] = field(default_factory=MappingConfig)
+    drives: Annotated[tuple[Drive, ...], Doc("Several.")] = (Drive(), Drive(7.0))
+    arms: Annotated[dict, Doc("Tables.")] = field(default_factory=lambda: {"a_m": 1})
+    until_s: Annotated[float | None, Doc("Not set.", "s")] = None
+
+
+def test_every_parameter_stands_in_a_table_with_its_own_unit_and_the_seed_among_what_was_run(tmp_path):
+    save_config(Documented(), tmp_path / "config.toml")
+    text = write(tmp_path, config=Documented())
+    for row in (
+        *(
+            ["mapping.grid.cell_m", "0.05", "m"],
+            ["mapping.grid.clamp", "-6, 6", "nat"],
+            ["drives[1].longest", "6", "m"],
+        ),
+        *(["drives[2].longest", "7", "m"], ["drives[2].share_m", "0.5", ""], ["world_seed", "7", ""]),
+        *(["arms.a_m", "1", ""], ["mapping.matcher.num_disparities", "64", "px"]),
+    ):
+        assert "".join(f"<td>{cell}</td>" for cell in row) in text
+    assert "<tr><th>seed</th><td>world_seed 7</td></tr>" in text
+    assert "<th>unit</th>" not in write(tmp_path)  # nobody guesses
+
+
+def test_a_run_folder_tells_when_it_began_and_its_record_what_was_run(tmp_path):
+    record = RunRecord("map", "stereogrid map drive.mcap", "../drive.mcap", end_s=9.0, stride=2)
+    with run_folder(tmp_path, "drive") as folder:
+        record.save(folder)
+        text = write(folder, facts={})
+        began = begun(folder)
+    assert abs((datetime.now() - began).total_seconds()) < 60
+    rows = dict(re.findall(r"<tr><th>(.*?)</th><td>(.*?)</td></tr>", text))
+    assert rows["date"] == f"{began:%Y-%m-%d %H:%M:%S}" and re.fullmatch(r"\d+ s", rows["duration"])
+    assert rows["command"] == record.command and rows["recording"] == record.recording
+    assert rows["part of it"] == "to 9 s one observation of 2"
+    assert begun(tmp_path) is None
+
+
+def test_an_interval_stands_below_its_score_and_nothing_where_there_is_none():
+    assert format_score(Score("auc", 0.9, "1", 5, 0.8, 0.95)) == "0.900<small>0.800 to 0.950</small>"
+    assert format_score(Score("accuracy_m", 0.9, "m", 5)) == "0.900 m"
+
+
+@pytest.mark.parametrize("name", MEANINGS)
+def test_every_score_has_a_meaning(name):
+    table = score_table({"map": [Score(name, 0.5, "1", 5)]})
+    (meaning,) = re.findall(r'<td class="meaning">(.*?)</td>', table)
+    assert len(meaning) > 10
+
+
+def test_what_a_map_has_without_a_truth_has_meanings_too():
+    assert {"camera_height_m", "disparity_density", "known_cells"} <= set(MEANINGS)
+    assert {*SCORE_NAMES, *BOUND_NAMES, *HELD_OUT_NAMES} <= set(MEANINGS)
+
+
+def test_notes_stand_below_the_scores(tmp_path):
+    text = write(tmp_path, notes=["Intervals: of <blocks>."])
+    assert "auc" in text.split("Intervals: of &lt;blocks&gt;.")[0] and "<figure>" in text.split("&lt;blocks")[1]
 
 
 def test_a_headline_comes_first_and_all_scores_are_still_there(tmp_path):

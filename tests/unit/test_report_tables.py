@@ -1,6 +1,8 @@
 """Tables of a report: the same cells in HTML and in Markdown, and nothing that breaks out of a cell."""
 
+import ast
 import re
+from pathlib import Path
 
 import pytest
 
@@ -30,6 +32,15 @@ def test_markdown_has_a_line_a_row_and_as_many_cells_in_each():
 def test_a_row_that_does_not_fit_its_header_is_refused():
     with pytest.raises(InvalidInputError, match="a row of 2 cells under a header of 3: teddy"):
         ReportTable("Pairs", ["pair", "matcher", "bad %"], [["teddy", "bm"]])
+
+
+def test_every_run_with_a_config_tells_its_reports_table_which():
+    """Or the parameters would stand there without their units."""
+    root = Path(__file__).parents[2]
+    for path in [*(root / "experiments").glob("*_report.py"), root / "stereogrid" / "map_report.py"]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "write_report":
+                assert "config" in [each.arg for each in node.keywords], f"{path.name}:{node.lineno}"
 
 
 def test_tables_come_before_the_figures_and_the_scores_fold_away(tmp_path):

@@ -1,19 +1,13 @@
 """The map in the browser: what is drawn, who may look, and what it costs whom."""
 
-import base64
 import http.client
-import json
 import re
-import shutil
-import subprocess
 import sys
 import threading
 import time
-import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -21,7 +15,10 @@ import pytest
 
 pytest.importorskip("viser", reason="the view needs viser")
 
+import msgspec
+import viser
 import websockets.exceptions
+from browsers import CHROMIUM, Browser, until
 from websockets.sync.client import connect
 
 from stereogrid.camera import StereoCamera
@@ -29,17 +26,14 @@ from stereogrid.errors import MissingExtraError
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
 from stereogrid.viewer import LiveView
-from stereogrid.viewer.scene import cell_colours, height_colours
+from stereogrid.viewer.colours import PALETTES, ramp, shaded
+from stereogrid.viewer.controls import Choices
+from stereogrid.viewer.server import close_server, open_server, url_of
 from stereogrid.viewer.snapshot import Snapshot
 
 CAMERA = StereoCamera(170, 79.5, 59.5, 0.06, 160, 120)
 T_WORLD_CAM = from_rotation(R_BASE_OPTICAL, [0.0, 0.0, 0.4])
 LEFT = np.random.default_rng(1).integers(0, 256, CAMERA.shape, dtype=np.uint8)
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-FLAGS = (
-    *("--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=640,400"),
-)
 
 
 def wall_grid(n: int = 40) -> OccupancyGrid:
@@ -67,10 +61,17 @@ def ask(view: LiveView, path: str = "/", **headers: str) -> int:
     return connection.getresponse().status
 
 
+def occupied_m(grid: OccupancyGrid, threshold: float, below_m: float = np.inf) -> np.ndarray:
+    """Centres (N, 3) of the cells that are drawn."""
+    cells = Snapshot.of(grid).cells()
+    choices = Choices(threshold, (-np.inf, below_m))
+    return cells.centres_m(cells.select(threshold, choices.box(cells.cell_m)).cells)
+
+
 @pytest.mark.parametrize("threshold", [0.5, 0.7, 0.9])
 def test_what_is_drawn_are_the_maps_occupied_cells_below_the_height(threshold: float) -> None:
     grid = wall_grid()
-    drawn = Snapshot.of(grid).occupied_m(threshold, below_m=0.6)
+    drawn = occupied_m(grid, threshold, below_m=0.6)
     centres = grid.occupied_centres(threshold)
     assert 0 < len(drawn) < len(centres)
     assert {tuple(p) for p in drawn.round(6)} == {tuple(p) for p in centres[centres[:, 2] < 0.6].round(6)}
@@ -79,13 +80,13 @@ def test_what_is_drawn_are_the_maps_occupied_cells_below_the_height(threshold: f
 def test_a_snapshot_stays_as_it_was_while_the_map_goes_on() -> None:
     grid = wall_grid()
     snapshot = Snapshot.of(grid)
-    before = snapshot.occupied_m(0.5)
+    before = snapshot.values()
     grid.merge(wall_grid(60))
-    assert np.array_equal(snapshot.occupied_m(0.5), before)
+    assert np.array_equal(snapshot.values(), before)
 
 
 def test_colours_run_with_height_and_end_at_both_ends() -> None:
-    colours = height_colours(np.array([-9.0, -0.2, 0.4, 1.8, 9.0])).astype(int)
+    colours = ramp(np.array([-9.0, -0.2, 0.4, 1.8, 9.0]), (-0.2, 1.8), PALETTES["height"]).astype(int)
     assert (colours[0] == colours[1]).all() and (colours[3] == colours[4]).all()
     brightness = colours.sum(axis=1)
     assert brightness[0] < brightness[2] < brightness[4]
@@ -105,6 +106,24 @@ def test_the_page_is_for_this_machines_own_browser_alone() -> None:
                 connect(address, origin=origin)  # type: ignore[arg-type]
         with connect(address, origin=own, subprotocols=["viser-v0"]):  # type: ignore[arg-type, list-item]
             pass
+
+
+def test_no_page_can_open_a_tunnel_to_the_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a page would ask for it: by the message that the button sends, which is not shown."""
+    opened: list[object] = []
+    monkeypatch.setattr("viser._viser.ViserTunnel", lambda *address: opened.append(address))
+    server = open_server(0, "a map")
+    try:
+        own = url_of(server).strip("/")
+        asked = connect(own.replace("http", "ws"), origin=own, subprotocols=[f"viser-v{viser.__version__}"])  # type: ignore[arg-type, list-item]
+        with asked as page:
+            page.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
+            # What comes after it has been dealt with: the same client may still be told of changes.
+            page.ping().wait(10)
+            time.sleep(0.3)
+            assert not opened and server.request_share_url() is None
+    finally:
+        close_server(server)
 
 
 def test_showing_never_waits_for_the_page_and_a_fault_of_the_page_is_no_fault_of_the_map() -> None:
@@ -129,49 +148,6 @@ def test_without_viser_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) 
         LiveView(CAMERA)
 
 
-class Browser:
-    """A headless Chromium on one page, asked by its DevTools protocol."""
-
-    def __init__(self, url: str, folder: Path) -> None:
-        command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={folder}", "--remote-debugging-port=0", "about:blank"]
-        self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        assert self.process.stderr is not None
-        port = next(found[1] for line in self.process.stderr if (found := re.search(r"127\.0\.0\.1:(\d+)/", line)))
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
-            pages = [page for page in json.load(answer) if page["type"] == "page"]
-        self._socket = connect(pages[0]["webSocketDebuggerUrl"], max_size=None)
-        self._n = 0
-        self.ask("Page.navigate", url=url)
-
-    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        self._n += 1
-        self._socket.send(json.dumps({"id": self._n, "method": method, "params": parameters}))
-        while (answer := json.loads(self._socket.recv(60))).get("id") != self._n:
-            pass
-        result: dict[str, Any] = answer["result"]
-        return result
-
-    def text(self) -> str:
-        shown = self.ask("Runtime.evaluate", expression="document.body ? document.body.innerText : ''")
-        return str(shown["result"].get("value", ""))
-
-    def picture(self) -> np.ndarray:
-        png = base64.b64decode(self.ask("Page.captureScreenshot")["data"])
-        return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR))
-
-    def close(self) -> None:
-        self._socket.close()
-        self.process.kill()
-        self.process.wait()
-
-
-def until(true: Callable[[], object], within_s: float = 90.0) -> None:
-    end_s = time.monotonic() + within_s
-    while not true():
-        assert time.monotonic() < end_s, "it did not happen"
-        time.sleep(0.2)
-
-
 def coloured(picture: np.ndarray) -> int:
     """Pixels of the scene that are neither grey nor white, without the panel at the right."""
     scene = picture[:, :330].astype(int)
@@ -181,9 +157,10 @@ def coloured(picture: np.ndarray) -> int:
 def test_cells_are_told_apart_by_their_shade_and_a_map_of_many_is_drawn_as_points(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    centres = wall_grid().occupied_centres()
-    colours = cell_colours(centres, 0.05).astype(int)
-    beside = np.flatnonzero(np.isclose(np.diff(centres[:, 2]), 0.05) & (np.diff(centres[:, 1]) == 0))
+    cells = Snapshot.of(wall_grid()).cells().select(0.5).cells
+    cells = cells[np.lexsort(cells.T[::-1])]
+    colours = shaded(ramp(cells[:, 2].astype(float), (-4, 36), PALETTES["height"]), cells).astype(int)
+    beside = np.flatnonzero((np.diff(cells[:, 2]) == 1) & (np.diff(cells[:, 1]) == 0))
     assert len(beside) and (colours[beside].sum(axis=1) != colours[beside + 1].sum(axis=1)).all()
     monkeypatch.setattr("stereogrid.viewer.scene.MOST_CUBES", 100)
     grid, lock = wall_grid(), threading.Lock()
@@ -192,7 +169,7 @@ def test_cells_are_told_apart_by_their_shade_and_a_map_of_many_is_drawn_as_point
         for size in (40, 50):
             with lock:
                 grid.merge(wall_grid(size))
-            n = len(Snapshot.of(grid).occupied_m(0.6, 1.4))
+            n = len(occupied_m(grid, 0.6, 1.4))
             until(lambda n=n: view.drawn == n)
 
 

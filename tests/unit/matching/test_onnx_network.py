@@ -126,7 +126,7 @@ GOOD = {"weights": "net.onnx", "inputs": [{"name": "a", "image": "left"}, {"name
         ({"inputs": [{"name": "a", "image": "stacked"}] * 2}, "inputs must be named once each"),
         ({"inputs": {"name": "a"}}, "'inputs' must be a list"),
         ({"inputs": [{"name": "a", "image": "stacked", "size": 2}]}, "size must be above 0 and at most 1, not 2.0"),
-        ({"layout": "NWHC"}, "no layout named 'NWHC'; choose from: NCHW, NHWC"),
+        ({"layout": "NWHC"}, r"no layout named 'NWHC'; did you mean 'NHWC'\? choose from: NCHW, NHWC"),
         ({"order": "gbr"}, "no order named 'gbr'"),
         ({"channels": 6}, "channels must be 1 or 3, not 6"),
         ({"mean": [1.0, 2.0]}, "mean must be one number or one a channel"),

@@ -108,7 +108,7 @@ def test_rosbags_reads_every_message(mcap_file: Path, synthetic: SimpleNamespace
     with AnyReader([mcap_file]) as bag:
         messages = [(c.topic, bag.deserialize(raw, c.msgtype)) for c, _, raw in bag.messages()]
         assert {c.topic: c.msgtype for c in bag.connections} == TOPICS
-    assert len(messages) == 5 * (8 + 3 * 2) + 1
+    assert len(messages) == 5 * (9 + 3 * 2) + 1
     P_right = next(m for topic, m in messages if topic == "/right/camera_info").p
     assert P_right[3] == pytest.approx(-40 * 0.06)
     depth = next(m for topic, m in messages if topic == "/truth/depth")
@@ -128,9 +128,10 @@ def test_the_ros2_reader_of_mcap_reads_every_message(mcap_file: Path) -> None:
     (tf,) = [message for topic, _, message in messages if topic == "/tf_static"]
     frames = tf.transforms[0].header.frame_id, tf.transforms[0].child_frame_id
     assert frames == ("base_link", "left_camera_optical")
+    assert len([topic for topic, _, _ in messages if topic == "/tf"]) == 5
     for topic, record, message in messages:
         assert record.log_time == record.publish_time
-        if topic not in ("/tf_static", "/truth/movers"):
+        if topic not in ("/tf", "/tf_static", "/truth/movers"):
             assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == record.log_time
 
 

@@ -1,5 +1,6 @@
 """A killed, cut or corrupted recording gives its readable part or one RecordingError, and never anything else."""
 
+import io
 import os
 import signal
 import subprocess
@@ -15,11 +16,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.records import Message
+from mcap.writer import CompressionType, Writer
 
-from stereogrid.errors import RecordingError
+from stereogrid.cli import app, run
+from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.observation import Observation
 from stereogrid.recording import ros2_messages as ros2
 from stereogrid.recording.mcap import McapRecording
+from stereogrid.recording.mcap_file import ClippedFile, Records
 from stereogrid.recording.ros2_schemas import SCHEMAS
 
 N = 4
@@ -193,7 +199,7 @@ WRONG = {
     "no transform": ({ros2.TF_STATIC: None}, "no transform base_link -> left_camera_optical"),
     "another stamp": ({ros2.ODOMETRY: ros2.odometry_message(6, np.eye(4))}, "stamps .* never agree"),
     "no png": ({ros2.LEFT_IMAGE: picture(b"GIF89a")}, "/left/.*not a PNG"),
-    "half a png": ({ros2.LEFT_IMAGE: picture(png(np.zeros((24, 32), np.uint8))[:40])}, "/left/.*not a readable"),
+    "half a png": ({ros2.LEFT_IMAGE: picture(png(np.zeros((24, 32), np.uint8))[:40])}, "/left/.*cut short"),
     "another size": (
         {ros2.RIGHT_IMAGE: picture(png(np.zeros((9, 9), np.uint8)))},
         r"/right/.* is \(9, 9\), the recording's camera \(24, 32\)",
@@ -239,3 +245,119 @@ def test_an_unknown_format_version_is_named(tmp_path: Path, mcap_file: Path) -> 
 def test_a_recording_without_observations_says_so(tmp_path: Path, synthetic: SimpleNamespace) -> None:
     with pytest.raises(RecordingError, match=r"empty\.mcap: no messages on /left/image_rect"):
         McapRecording(synthetic.write_mcap(tmp_path / "empty.mcap", []))
+
+
+def chunks_of(content: bytes) -> list[tuple[int, int, str]]:
+    """Where each chunk begins and ends, and the topic of its message: ours have one each."""
+    reader = make_reader(io.BytesIO(content))
+    summary = reader.get_summary()
+    assert summary is not None
+    return [
+        (
+            each.chunk_start_offset,
+            each.chunk_start_offset + each.chunk_length,
+            summary.channels[next(iter(each.message_index_offsets))].topic,
+        )
+        for each in summary.chunk_indexes
+    ]
+
+
+def with_damage(content: bytes, place: int) -> bytes:
+    return content[:place] + bytes([content[place] ^ 0x55]) + content[place + 1 :]
+
+
+@pytest.mark.parametrize("topic", ["/left/image_rect/compressed", "/right/image_rect/compressed", "/odom"])
+@pytest.mark.parametrize("k", [0, 1, N - 1])
+@pytest.mark.parametrize("where", ["data", "length", "opcode"])
+def test_a_bad_chunk_costs_its_own_observation_alone(whole: SimpleNamespace, topic: str, k: int, where: str) -> None:
+    """Its checksum wrong, where it ends unknown, or not even known for a chunk; the first one declares its channel."""
+    start, end, _ = [each for each in chunks_of(whole.content) if each[2] == topic][k]
+    outcome = read(whole, with_damage(whole.content, {"data": end - 5, "length": start + 3, "opcode": start}[where]))
+    assert outcome is not None
+    recording, observations = outcome
+    expected = [each for number, each in enumerate(whole.observations) if number != k]
+    assert all(same(a, b) and same_truth(a, b) for a, b in zip(expected, observations, strict=True))
+    assert recording.damage is not None
+    n_messages = len(chunks_of(whole.content))
+    assert f"byte {start}: " in recording.damage and f"; 1 of {n_messages} messages are lost" in recording.damage
+    assert recording.left_out == {"moments without both images and odometry": 1}
+
+
+def test_what_follows_a_hole_in_a_file_without_an_index_is_read_too(whole: SimpleNamespace) -> None:
+    chunks = [each for each in chunks_of(whole.content) if each[2] == "/right/image_rect/compressed"]
+    # From amid the second observation's image to amid the third's: no record in between is whole.
+    hole = slice(chunks[1][0] + 100, chunks[2][0] + 100)
+    content = bytearray(whole.content[: chunks[3][1]])
+    content[hole] = bytes(len(content[hole]))
+    outcome = read(whole, bytes(content))
+    assert outcome is not None
+    recording, observations = outcome
+    assert [each.stamp_s for each in observations] == [whole.observations[k].stamp_s for k in (0, 3)]
+    assert recording.damage is not None and "more places" in recording.damage
+
+
+def test_a_chunk_that_would_unpack_to_terabytes_is_passed_over(whole: SimpleNamespace) -> None:
+    (start, _, _), *_ = [each for each in chunks_of(whole.content) if each[2] == "/truth/depth"]
+    name_at = start + 9 + 8 + 8 + 8 + 4 + 4
+    assert whole.content[name_at : name_at + 4] == b"zstd"
+    frame = bytes([0x28, 0xB5, 0x2F, 0xFD, 0xE0]) + (2**45).to_bytes(8, "little")
+    place = name_at + 4 + 8
+    outcome = read(whole, whole.content[:place] + frame + whole.content[place + len(frame) :])
+    assert outcome is not None and len(outcome[1]) == N
+    assert outcome[0].damage is not None and "a chunk claims to unpack to 35184372088832 bytes" in outcome[0].damage
+    assert outcome[1][0].truth is not None and outcome[1][0].truth.depth_m is None
+
+
+def test_a_chunk_of_lz4_unpacks_to_no_more_than_it_claims(tmp_path: Path) -> None:
+    path, sent = tmp_path / "a.mcap", bytes(2**22)
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.LZ4)
+        writer.start()
+        channel = writer.register_channel("/zeros", "raw", writer.register_schema("zeros", "raw", b""))
+        writer.add_message(channel, 0, sent, 0)
+        writer.finish()
+    content = path.read_bytes()
+    start = next(offset for offset, found in records_of(path) if any(isinstance(each, Message) for each in found))
+    assert content[start] == 6 and len(content) < 2**15
+    with ClippedFile(path) as opened:
+        (message,) = (each for each in opened.records_at(start) if isinstance(each, Message))
+        assert message.data == sent
+    size_at = start + 9 + 8 + 8
+    path.write_bytes(content[:size_at] + (1000).to_bytes(8, "little") + content[size_at + 8 :])
+    with ClippedFile(path) as opened, pytest.raises(InvalidInputError, match="a chunk unpacks to more than 1000 bytes"):
+        opened.records_at(start)
+
+
+def records_of(path: Path) -> list[tuple[int, list[Any]]]:
+    with ClippedFile(path) as file:
+        return list(Records(file, path))
+
+
+def test_a_file_damaged_everywhere_is_given_up(whole: SimpleNamespace) -> None:
+    """A hostile one could otherwise keep a reader busy for ever."""
+    record = bytes([0x06]) + (3).to_bytes(8, "little") + b"abc"
+    path = whole.path
+    path.write_bytes(whole.content[:8] + record * 100_000)
+    with pytest.raises(RecordingError, match="not an MCAP file"):
+        McapRecording(path)
+
+
+def test_stamps_that_go_back_are_sorted_and_repeats_are_counted(tmp_path: Path, synthetic: SimpleNamespace) -> None:
+    """As of a clock that was set, or of a bag that was played into another."""
+
+    def of(each: Observation) -> Iterator[tuple[str, int, Any]]:
+        stamp_ns = ros2.stamp_to_ns(each.stamp_s)
+        yield ros2.TF_STATIC, stamp_ns, ros2.static_transform_message(stamp_ns, synthetic.T_base_cam)
+        for topic, right in ((ros2.LEFT_INFO, False), (ros2.RIGHT_INFO, True)):
+            yield topic, stamp_ns, ros2.camera_info_message(stamp_ns, synthetic.camera, right=right)
+        yield ros2.ODOMETRY, stamp_ns, ros2.odometry_message(stamp_ns, each.odometry.T_odom_base)
+        yield ros2.LEFT_IMAGE, stamp_ns, ros2.image_message(stamp_ns, each.left)
+        yield ros2.RIGHT_IMAGE, stamp_ns, ros2.image_message(stamp_ns, each.right)
+
+    written = synthetic.observations(4)
+    order = [2, 0, 3, 1, 2]
+    path = write_messages(tmp_path / "a.mcap", (each for k in order for each in of(written[k])))
+    recording = McapRecording(path)
+    assert all(same(a, b) for a, b in zip(written, recording, strict=True))
+    assert recording.left_out == {"images and odometry with the stamp of an earlier one": 3}
+    assert run(app, ["info", str(path)]) == 0

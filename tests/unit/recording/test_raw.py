@@ -18,10 +18,11 @@ from stereogrid.camera import StereoCamera
 from stereogrid.cli import app, run
 from stereogrid.errors import InvalidInputError, RecordingError
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation, from_yaw
-from stereogrid.recording import RawMcapRecording, RawReport, RawTopics, RawWriter, open_recording
+from stereogrid.recording import Given, PairingLimits, RawMcapRecording, RawReport, RawTopics, RawWriter, open_recording
 from stereogrid.recording import ros2_messages as ros2
 from stereogrid.recording import ros2_raw as raw
 from stereogrid.recording.ros2_file import Ros2File
+from stereogrid.recording.ros2_images import read_image
 from stereogrid.recording.ros2_schemas import SCHEMAS
 
 RIG = crooked_rig()
@@ -49,6 +50,23 @@ def write(path: Path, n: int = 10, *, first: int = 0, rig: Any = RIG, T_base_cam
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("raw") / "drive.mcap")
+
+
+def test_where_all_pairs_are_smeared_that_is_what_is_said(tmp_path: Path) -> None:
+    """Ten radians a second, four milliseconds apart; of the second drive the odometry ends before the others."""
+    for name, n_reports, message in (
+        ("a", 10, r"a\.mcap: all are pairs taken too far apart for how fast .* by /odom, .* more than 1 px between"),
+        ("b", 3, r"b\.mcap: /odom tells of no moment .*; left out before: 2 pairs taken too far apart for how fast"),
+    ):
+        with RawWriter(tmp_path / f"{name}.mcap", RIG, T_BASE_CAM) as writer:
+            for k in range(n_reports):
+                writer.write_report(RawReport(T0 + 0.1 * k, from_yaw(1.0 * k)))
+            for k in range(n_reports - 1):
+                writer.write_pair(*BOTH, T0 + 0.1 * k + 0.048, T0 + 0.1 * k + 0.052)
+            if name == "b":
+                writer.write_pair(*BOTH, T0 + 9, T0 + 9)
+        with pytest.raises(RecordingError, match=message):
+            open_recording(tmp_path / f"{name}.mcap")
 
 
 def test_what_a_bent_and_crooked_rig_sees_comes_back_as_ideal_cameras_see_it(drive: Path) -> None:
@@ -101,7 +119,7 @@ def test_pairs_whose_pictures_turning_has_moved_apart_are_left_out_and_counted(t
     kept = [0, 1, 2, 3, 4, 6, 8]
     assert recording.stamps_s == pytest.approx(T0 + 0.055 + 0.1 * np.array(kept), abs=0.003)
     assert recording.left_out == {"pairs taken too far apart for how fast the robot turned": 3}
-    assert len(RawMcapRecording(tmp_path / "a.mcap", max_smear_px=3.0)) == 10
+    assert len(RawMcapRecording(tmp_path / "a.mcap", limits=PairingLimits(max_smear_px=3.0))) == 10
 
 
 def test_of_a_drive_whose_odometry_was_lost_the_piece_with_the_most_pairs_counts(tmp_path: Path) -> None:
@@ -152,7 +170,7 @@ def test_rosbags_reads_every_message_and_the_calibration_whole(drive: Path) -> N
         messages = [(c.topic, bag.deserialize(data, c.msgtype), stamp) for c, stamp, data in bag.messages()]
         assert {c.topic: c.msgtype for c in bag.connections} == raw.TOPICS
     counts = Counter(topic for topic, *_ in messages)
-    assert counts == dict.fromkeys(raw.TOPICS, 10) | {"/tf_static": 1, "/odom": 11, "/sonar": 20}
+    assert counts == dict.fromkeys(raw.TOPICS, 10) | {"/tf_static": 1, "/odom": 11, "/tf": 11, "/sonar": 20}
     first = {topic: message for topic, message, _ in reversed(messages)}
     for side, topic in enumerate(("/left/camera_info", "/right/camera_info")):
         info = first[topic]
@@ -168,7 +186,7 @@ def test_rosbags_reads_every_message_and_the_calibration_whole(drive: Path) -> N
     for picture, taken in zip(pictures, BOTH, strict=True):
         np.testing.assert_array_equal(cv2.imdecode(picture, cv2.IMREAD_UNCHANGED), taken)
     for topic, message, stamp_ns in messages:
-        if topic != "/tf_static":
+        if topic not in ("/tf", "/tf_static"):
             assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp_ns
 
 
@@ -179,7 +197,7 @@ def test_a_finished_file_has_an_index_by_which_others_seek(drive: Path) -> None:
         # One chunk a pair and one a report, not one a message.
         assert len(summary.chunk_indexes) == summary.statistics.chunk_count == 21
         late = list(make_reader(file).iter_messages(starting_at=int((T0 + 0.95) * 1e9)))
-    assert {channel.topic for _, channel, _ in late} == {"/odom", raw.RIGHT_IMAGE, ros2.RIGHT_INFO}
+    assert {channel.topic for _, channel, _ in late} == {"/odom", "/tf", raw.RIGHT_IMAGE, ros2.RIGHT_INFO}
 
 
 def foreign(path: Path, topics: RawTopics, image: Any, **changed: Any) -> Path:
@@ -289,15 +307,19 @@ TOPICS = RawTopics("/cam0/image", "/cam1/image", "/cam0/info", "/cam1/info", "/w
 
 
 @pytest.mark.parametrize(
-    "image", [uncompressed("mono8", 1, pad=32), uncompressed("rgb8", 3), uncompressed("bgra8", 4)], ids=str
+    "image",
+    [uncompressed("mono8", 1, pad=32), uncompressed("rgb8", 3), uncompressed("bgra8", 4)],
+    ids=["mono8", "rgb8", "bgra8"],
 )
 def test_bags_of_others_are_read_by_their_own_topics(tmp_path: Path, image: Any) -> None:
     path = foreign(tmp_path / "bag.mcap", TOPICS, image)
     (pair,) = RawMcapRecording(path, TOPICS).raw_pairs()
     np.testing.assert_array_equal(pair[0], BOTH[0])
     np.testing.assert_array_equal(pair[1], BOTH[1])
-    with pytest.raises(RecordingError, match="no messages on /left/image_rect/compressed"):
+    with pytest.raises(RecordingError, match=r"lead from base_link to the left camera's frame 'cam'.*--mount"):
         open_recording(path)
+    (found,) = open_recording(path, given=Given(T_base_cam=T_BASE_CAM))
+    np.testing.assert_array_equal(found.left, next(iter(RawMcapRecording(path, TOPICS))).left)
 
 
 @pytest.mark.parametrize(
@@ -320,7 +342,7 @@ def test_a_calibration_that_cannot_be_true_is_refused(tmp_path: Path, changed: d
 
 def test_an_encoding_that_is_no_picture_is_named_with_the_choices(tmp_path: Path) -> None:
     path = foreign(tmp_path / "bag.mcap", TOPICS, uncompressed("16UC1", 2))
-    with pytest.raises(RecordingError, match=r"no encoding of /cam0/image named '16UC1'; choose from: 8UC1"):
+    with pytest.raises(RecordingError, match=r"no encoding of /cam0/image named '16UC1'; did you mean '8UC1'"):
         list(RawMcapRecording(path, TOPICS))
 
 
@@ -328,11 +350,11 @@ def test_an_encoding_that_is_no_picture_is_named_with_the_choices(tmp_path: Path
 def test_jpeg_pictures_are_read_too(tmp_path: Path, progressive: int) -> None:
     _, jpeg = cv2.imencode(".jpg", BOTH[0], [cv2.IMWRITE_JPEG_PROGRESSIVE, progressive])
     message = raw_message(jpeg.tobytes())
-    np.testing.assert_allclose(raw.read_image(message, "/left", (120, 160)).astype(int), BOTH[0], atol=12)
+    np.testing.assert_allclose(read_image(message, "/left", (120, 160)).astype(int), BOTH[0], atol=12)
     with pytest.raises(InvalidInputError, match=r"/left is \(120, 160\), the recording's camera \(64, 64\)"):
-        raw.read_image(message, "/left", (64, 64))
+        read_image(message, "/left", (64, 64))
     with pytest.raises(RecordingError, match="/left: a JPEG image without a size"):
-        raw.read_image(raw_message(jpeg.tobytes()[:20]), "/left", (120, 160))
+        read_image(raw_message(jpeg.tobytes()[:20]), "/left", (120, 160))
 
 
 def raw_message(data: bytes) -> Any:

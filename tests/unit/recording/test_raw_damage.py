@@ -1,5 +1,6 @@
 """A raw recording that was cut, killed or corrupted gives its readable part or one RecordingError."""
 
+import io
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 
 from stereogrid.camera import StereoCamera
 from stereogrid.errors import RecordingError
@@ -94,3 +96,24 @@ def test_a_file_that_is_no_more_than_begun_says_what_is_missing(tmp_path: Path) 
         writer.write_report(RawReport(10.0, np.eye(4)))
     with pytest.raises(RecordingError, match=r"a\.mcap: no messages on /left/image_raw/compressed"):
         open_recording(tmp_path / "a.mcap")
+
+
+@pytest.mark.parametrize("k", range(N))
+def test_a_bad_chunk_costs_its_pair_alone(whole: SimpleNamespace, k: int) -> None:
+    """The first pair's declares the channels of all."""
+    summary = make_reader(io.BytesIO(whole.content)).get_summary()
+    assert summary is not None
+    topics = {number: channel.topic for number, channel in summary.channels.items()}
+    pairs = [
+        each
+        for each in summary.chunk_indexes
+        if "/left/image_raw/compressed" in {topics[number] for number in each.message_index_offsets}
+    ]
+    content = bytearray(whole.content)
+    content[pairs[k].chunk_start_offset + pairs[k].chunk_length - 9] ^= 0x10
+    outcome = read(whole, bytes(content))
+    assert outcome is not None and not outcome[0]
+    expected = [each for number, each in enumerate(whole.observations) if number != k]
+    assert all(same(a, b) for a, b in zip(expected, outcome[1], strict=True))
+    damage = open_recording(whole.path).damage
+    assert damage is not None and f"; 4 of {summary.statistics.message_count} messages are lost" in damage  # type: ignore[union-attr]

@@ -67,6 +67,12 @@ def test_the_wall_is_seen_from_the_front_only(truth):
     np.testing.assert_allclose(occupied[:, 0], 2.05)
 
 
+def test_without_any_true_pose_there_is_nothing_to_score_against(camera, wall):
+    """As in a part of a recording in which the true poses are missing."""
+    with pytest.raises(RecordingError, match="of no observation the true pose is known"):
+        MapTruth.of_recording(Drive(camera, wall, np.full((3, 4, 4), np.nan)), CELL_M, max_range_m=5, around_path=True)
+
+
 def test_an_observation_without_a_true_pose_is_left_out(drive, camera, wall, truth):
     with_hole = np.concatenate([drive.true_poses(), np.full((1, 4, 4), np.nan)])[[2, 0, 1]]
     other = MapTruth.of_recording(Drive(camera, wall, with_hole), CELL_M, max_range_m=5)

@@ -20,9 +20,9 @@ from hardware.calibrating.from_cameras import calibrate_live
 from hardware.calibrating.live_session import LiveSession
 from hardware.calibrating.outcome import Outcome
 from hardware.cameras import open_cameras
-from stereogrid.cli import track
 from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import FloatArray
+from stereogrid.screen import track
 
 FPS = 10
 HELD = 6

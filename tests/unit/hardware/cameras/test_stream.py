@@ -11,7 +11,9 @@ from hardware.clock import to_epoch_s
 
 
 @pytest.mark.parametrize(
-    ("kind", "zero_s"), [("monotonic", 0.0), ("epoch", time.time() - time.monotonic()), ("arrival", -1e6)]
+    ("kind", "zero_s"),
+    [("monotonic", 0.0), ("epoch", time.time() - time.monotonic()), ("arrival", -1e6)],
+    ids=["monotonic", "epoch", "arrival"],
 )
 def test_stamps_near_now_on_a_clock_we_know_are_believed_and_arrival_is_taken_else(kind: str, zero_s: float) -> None:
     clock = CaptureClock()

@@ -6,8 +6,8 @@ import pytest
 
 from hardware.cameras.pairs import RawPair
 from hardware.doctor.calibration import check_file, check_fit, check_own, check_size
-from hardware.doctor.check import NOT_THERE, OK, PROBLEM, WARNING
 from stereogrid.calibration import CalibrationErrors, Mount, StereoCalibration, save_calibration
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING
 from stereogrid.geometry import from_rotation
 
 SIZE_PX = (320, 240)

@@ -7,8 +7,8 @@ from usb_bus import UsbBus
 
 from hardware.cameras.discovery import find_cameras
 from hardware.doctor.cameras import check_bandwidth, check_devices, check_minoru
-from hardware.doctor.check import NOT_THERE, OK, PROBLEM, WARNING
 from hardware.doctor.usb import usb_devices
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from hardware.doctor.check import OK, PROBLEM, WARNING
 from hardware.doctor.machine import EXTRAS, check_clock, check_disk, check_extra, check_machine, check_tool
+from stereogrid.checks import OK, PROBLEM, WARNING
 
 
 def test_a_missing_program_is_a_warning_with_its_package():

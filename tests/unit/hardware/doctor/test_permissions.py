@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hardware.doctor.check import NOT_THERE, OK, PROBLEM, WARNING
 from hardware.doctor.permissions import Group, User, check_group, check_node, may_open, read_groups
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING
 
 GROUPS = [Group("root", 0, ()), Group("dialout", 20, ("bob",)), Group("video", 44, ())]
 

@@ -5,9 +5,9 @@ import pytest
 
 from hardware.cameras.pairs import PairCounts, RawPair
 from hardware.clock import now_s
-from hardware.doctor.check import OK, PROBLEM, WARNING
 from hardware.doctor.pictures import Measured, judge, measure
 from hardware.mailbox import Mailbox
+from stereogrid.checks import OK, PROBLEM, WARNING
 
 
 def measured(**changed):

@@ -12,10 +12,10 @@ from kinematic_body import KinematicBody
 from served_robot import ServedRobot
 
 from arcos import Code
-from hardware.doctor.check import OK, PROBLEM, WARNING
 from hardware.doctor.robot import check_robot
 from sim.firmware.tcp import TcpLink
 from sim.firmware.terminal import TerminalLink
+from stereogrid.checks import OK, PROBLEM, WARNING
 
 LISTEN_S = 0.5
 

@@ -3,9 +3,9 @@
 import pytest
 from usb_bus import UsbBus
 
-from hardware.doctor.check import NOT_THERE, OK, PROBLEM
 from hardware.doctor.serial_lines import SerialLine, check_adapters, check_lines, nodes, serial_lines
 from hardware.doctor.usb import usb_devices
+from stereogrid.checks import NOT_THERE, OK, PROBLEM
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from live_rig import camera_json
 from recorded_rig import CAMERA, RIG
 
 from hardware.errors import CameraError
-from hardware.live.rig import parse_mount, parse_size, rig_of
+from hardware.live.rig import parse_size, rig_of
 from stereogrid.calibration import CalibrationFile, Mount, StereoCalibration
 from stereogrid.errors import InvalidInputError
 from stereogrid.geometry import from_rotation
@@ -63,7 +63,7 @@ def test_what_is_missing_or_does_not_fit_is_said(about: dict[str, Any], calibrat
 @pytest.mark.parametrize("text", ["", "1,2", "a,b,c", "1,2,3,4,5,6,7", "0,0,nan", "0,0,-1", "0,0,.4,200"])
 def test_a_mount_that_no_camera_has_is_refused(text: str) -> None:
     with pytest.raises(InvalidInputError):
-        parse_mount(text)
+        Mount.parse(text)
 
 
 def test_sizes_are_read_and_what_is_none_is_refused() -> None:

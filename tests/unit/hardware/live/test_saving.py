@@ -19,6 +19,7 @@ from stereogrid.config import MappingConfig
 from stereogrid.grid import OccupancyGrid
 from stereogrid.mapping_run import Mapped
 from stereogrid.observation import Disparity, Observation, Odometry
+from stereogrid.run_record import RunRecord
 
 ROOT = Path(__file__).parents[4]
 MAPPED = Mapped(
@@ -43,6 +44,8 @@ def test_a_map_without_a_place_of_its_own_is_in_the_run_folder_alone(tmp_path: P
     (folder,) = result.places
     assert result.faults == () and OccupancyGrid.load(folder / "map.sgrid").sha256() == MAPPED.grid.sha256()
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {folder.name, "latest"}
+    record = RunRecord.load(folder)
+    assert record.program == "hardware drive" and record.results["map.sgrid"] == MAPPED.grid.sha256()
 
 
 @pytest.mark.parametrize("name", [None, "mine.sgrid", "no/such/folder/mine.sgrid"])

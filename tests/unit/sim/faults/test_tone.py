@@ -222,7 +222,10 @@ def test_parts_of_a_preset_are_chosen_in_words_or_by_name() -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("wild", "no preset of camera faults named 'wild'; choose from: bad, ideal, mild, minoru"),
+        (
+            "wild",
+            r"no preset of camera faults named 'wild'; did you mean 'mild'\? choose from: bad, ideal, mild, minoru",
+        ),
         ("mild, skew=0", "no camera fault named 'skew'; choose from: .*time_skew_s"),
         ("mild, jpeg_quality", "expected part=number, such as jpeg_quality=50, not 'jpeg_quality'"),
         ("mild, jpeg_quality=good", "expected part=number"),

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from hardware.doctor.check import NOT_THERE, OK, PROBLEM, WARNING, Check, as_table, healthy
+from stereogrid.checks import NOT_THERE, OK, PROBLEM, WARNING, Check, as_table, healthy
 from stereogrid.errors import InvalidInputError
 
 

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from .motion import MotionFit
+    from ..motion import MotionFit
 
 
 def motion_error(
@@ -33,10 +33,10 @@ def motion_error(
     """Fit the motion error to repeated runs over marks, for maps that reckon with it."""
     import numpy as np
 
-    from .errors import InvalidInputError
-    from .files import check_writable
-    from .motion import FitOptions, Measured, MotionError, fit_motion, read_runs
-    from .tomlfile import save_config
+    from ..errors import InvalidInputError
+    from ..files import check_writable
+    from ..motion import FitOptions, Measured, MotionError, fit_motion, read_runs
+    from ..tomlfile import save_config
 
     MotionError(way=way)  # refuses one that there is not before the work
     if figure is not None and figure.suffix.lower() != ".png":
@@ -55,14 +55,14 @@ def motion_error(
     if out is not None:
         save_config(replace(fit.error, way=way), out)
     if figure is not None:
-        from .figures import motion_figure, save_figure
+        from ..figures import motion_figure, save_figure
 
         save_figure(motion_figure(chosen, fit), figure)
     _print(fit)
 
 
 def _print(fit: "MotionFit") -> None:
-    from .motion.parameters import HEADER, parameters
+    from ..motion.parameters import HEADER, parameters
 
     console = Console()
     table = Table(*HEADER, box=None)

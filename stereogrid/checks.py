@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from stereogrid.errors import InvalidInputError
+from .errors import InvalidInputError
 
 OK, WARNING, PROBLEM, NOT_THERE = "ok", "warning", "problem", "not there"
 STATES = (OK, WARNING, PROBLEM, NOT_THERE)
