@@ -103,6 +103,8 @@ def read_table(path: str | Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: is no text in UTF-8, as TOML must be") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: its lists or tables are nested too deeply") from None
 
 
 def save_config(config: Any, path: str | Path, *, heading: str = "") -> None:

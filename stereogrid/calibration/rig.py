@@ -121,6 +121,10 @@ def check_rectifying_turn(R_rect_left: FloatArray) -> None:
 def _check_intrinsics(K: FloatArray, size_px: tuple[int, int], side: str) -> None:
     if K.shape != (3, 3) or not np.isfinite(K).all():
         raise InvalidInputError(f"the {side} intrinsics must be (3, 3) and finite, not {K.tolist()}")
+    if not np.array_equal([K[1, 0], *K[2]], [0, 0, 0, 1]):
+        raise InvalidInputError(
+            f"the {side} intrinsics must be [[fx, s, cx], [0, fy, cy], [0, 0, 1]], not {K.tolist()}"
+        )
     width, height = size_px
     low, high = (0.5 * width / np.tan(np.deg2rad(angle) / 2) for angle in FIELD_OF_VIEW_DEG[::-1])
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]

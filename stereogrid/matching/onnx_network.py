@@ -27,6 +27,15 @@ LAYOUTS = ("NCHW", "NHWC")
 ORDERS = ("rgb", "bgr")
 
 
+SMALLEST, LARGEST = 1e-6, 1e6
+"""Of what a network was trained with; float32 has no room for all that a text can say."""
+MOST_PADDED_PX, MOST_PX = 1024, 16_384
+
+
+def _within(numbers: tuple[float, ...], low: float) -> bool:
+    return all(low <= number <= LARGEST for number in numbers)
+
+
 @dataclass(frozen=True)
 class NetworkInput:
     """One input: its name, the image it wants ("stacked": left and right, one after the other's channels), its size.
@@ -83,15 +92,14 @@ class NetworkDescription:
     def _rules(self) -> tuple[tuple[str, bool, str], ...]:
         names, size = [each.name for each in self.inputs], self.fixed_size
         one_each = (1, self.channels)
-        finite = bool(np.isfinite([*self.mean, *self.std, self.scale]).all())
         return (
             ("inputs", len(set(names)) == len(names), "named once each"),
             ("channels", self.channels in (1, 3), "1 or 3"),
-            ("scale", finite and self.scale > 0, "positive, and mean, std and it finite"),
-            ("mean", len(self.mean) in one_each, "one number or one a channel"),
-            ("std", len(self.std) in one_each and min(self.std) > 0, "positive, one number or one a channel"),
-            ("pad_multiple", self.pad_multiple >= 1, ">= 1"),
-            ("fixed_size", len(size) in (0, 2) and min(size, default=1) > 0, "[height, width]"),
+            ("scale", SMALLEST <= self.scale <= LARGEST, f"{SMALLEST:g} to {LARGEST:g}"),
+            ("mean", len(self.mean) in one_each and _within(self.mean, -LARGEST), "one finite number or one a channel"),
+            ("std", len(self.std) in one_each and _within(self.std, SMALLEST), "positive, one number or one a channel"),
+            ("pad_multiple", 1 <= self.pad_multiple <= MOST_PADDED_PX, f"1 to {MOST_PADDED_PX}"),
+            ("fixed_size", len(size) in (0, 2) and all(0 < n <= MOST_PX for n in size), "[height, width]"),
             ("channel", self.channel >= 0, ">= 0"),
             ("sign", self.sign in (1, -1), "1 or -1"),
         )
