@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConfigError, InvalidInputError, MissingExtraError
 from ..observation import Disparity, FloatImage, Image, check_pair
+from ..places import is_file
 from ..tomlfile import load_config
 from .correlation import error_correlation_px
 from .onnx_network import NetworkDescription
@@ -104,7 +105,7 @@ def _session(weights: Path) -> Any:
         import onnxruntime
     except ImportError as error:
         raise MissingExtraError('the matcher onnx needs onnxruntime: pip install "stereogrid[onnx]"') from error
-    if not weights.is_file():
+    if not is_file(weights):
         raise InvalidInputError(f"{weights}: no such file of weights")
     options = onnxruntime.SessionOptions()
     options.log_severity_level = QUIET

@@ -306,3 +306,9 @@ def test_a_file_that_is_no_text_is_named_as_such(tmp_path):
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match=r"config\.toml: is no text in UTF-8, as TOML must be"):
         load_config(MappingConfig, path)
+
+
+def test_lists_nested_deeper_than_the_parser_can_go_are_refused_in_one_line(tmp_path):
+    (tmp_path / "deep.toml").write_text("a = " + "[" * 5000 + "]" * 5000)
+    with pytest.raises(ConfigError, match=r"deep\.toml: "):
+        load_config(MappingConfig, tmp_path / "deep.toml")

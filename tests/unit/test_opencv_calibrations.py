@@ -89,3 +89,32 @@ def test_opencvs_own_samples_lack_the_rotation(real_data: Callable[[str], Path])
         load_calibration(real_data("calibration") / "intrinsics.yml")
     with pytest.raises(ConfigError, match=r"stereo_calib\.xml: lacks M1"):
         load_calibration(real_data("calibration") / "stereo_calib.xml")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("rig.xml", '<!DOCTYPE a [<!ENTITY b "c">]><opencv_storage>&b;</opencv_storage>', "defines entities"),
+        (
+            "rig.xml",
+            "<opencv_storage><M1><rows>3</rows><cols>3</cols><data>1 2</data></M1></opencv_storage>",
+            "2 numbers",
+        ),
+        ("rig.yml", "%YAML:1.0\n---\na: &x [1]\nb: *x\n", "has aliases"),
+        ("rig.yml", "M1: !!python/object/apply:os.system [true]\n", "is no file of OpenCV's"),
+        (
+            "rig.yml",
+            "M1: !!opencv-matrix\n  rows: 99999999\n  cols: 1\n  data: [ 1. ]\n",
+            "has 1 numbers for 99999999 x 1",
+        ),
+    ],
+)
+def test_a_forged_file_is_refused_without_opencvs_parser(tmp_path: Path, name: str, text: str, reason: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ConfigError, match=reason):
+        load_calibration(tmp_path / name)
+
+
+def test_intrinsics_that_are_no_camera_matrix_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"left intrinsics must be \[\[fx, s, cx\]"):
+        load_calibration(written(tmp_path / "rig.yml", M1=np.array([[445.0, 0, 161], [0, 446, 118], [0, 0, 0]])))
