@@ -1,5 +1,5 @@
 # make demo, make test: both work from a bare clone with nothing but python3 and make.
-.PHONY: demo test test-slow test-vm bench bench-grid bench-render bench-stops lint types layers format wheel-check clean
+.PHONY: demo test test-slow test-vm fuzz bench bench-grid bench-render bench-stops lint types layers format wheel-check clean
 
 BOOTSTRAP := .bootstrap
 UV := $(BOOTSTRAP)/bin/uv
@@ -21,6 +21,10 @@ test-slow: .venv/ready
 # Real V4L2 devices, in a virtual machine; says which Debian packages it needs.
 test-vm: .venv/ready
 	$(PYTHON) tests/vm
+
+# Ten minutes of CPU for each reader of foreign bytes.
+fuzz: .venv/ready
+	$(PYTHON) tests/fuzz --minutes 10
 
 # Minutes on 2 cores; needs STEREOGRID_DATA, the folder of the real data.
 bench: bench-grid

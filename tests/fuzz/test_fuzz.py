@@ -4,6 +4,8 @@ A short seeded run; `make fuzz` runs each reader for minutes.
 """
 
 import sys
+import tracemalloc
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +21,10 @@ N = 60
 
 
 @pytest.fixture(scope="module")
-def watch() -> Watch:
-    return Watch()
+def watch() -> Iterator[Watch]:
+    yield Watch()
+    # It slows whatever comes after.
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize("name", TARGETS)
