@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from .checks import NOT_THERE, OK, PROBLEM, WARNING, Check
+from .kernel_cache import PREFIX
 from .versions import package_version
 
 NEWEST_TRIED = (3, 13)
@@ -158,6 +159,8 @@ def check_kernel_cache() -> Check:
     kernel = next(value for value in vars(walk).values() if hasattr(value, "_cache"))
     try:
         place = Path(kernel._cache.cache_path)
+        if any(each.name.startswith(PREFIX) for each in place.parents):
+            raise OSError("neither this installation nor the home can be written")
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=place):
             return Check("compiled kernels", OK, f"kept in {place}; the first run of a command compiles, half a minute")

@@ -4,6 +4,8 @@ import os
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
+PREFIX = "stereogrid-kernels-"
+"""Of the folder of a process that has no other place."""
 
 
 def find_place() -> None:
@@ -18,7 +20,7 @@ def find_place() -> None:
     import shutil
     import tempfile
 
-    place = tempfile.mkdtemp(prefix="stereogrid-kernels-")
+    place = tempfile.mkdtemp(prefix=PREFIX)
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     os.environ[VARIABLE] = place
 

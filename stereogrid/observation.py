@@ -156,7 +156,7 @@ class Disparity:
         )
 
     def _repr_html_(self) -> str:
-        caption = "disparity: near is red, far is blue, no match is white"
+        caption = "disparity: near is yellow, far is dark blue, no match is white"
         return shown(repr(self), disparity_picture(self.disparity_px), caption)
 
     @property

@@ -33,11 +33,11 @@ def pair_picture(left: Array, right: Array) -> Array:
 
 
 def disparity_picture(disparity_px: Array) -> Array:
-    """(H, W, 3) BGR: near is red, far is blue, white where nothing matched; the scale ends at the 99th percentile."""
+    """(H, W, 3) BGR: near is yellow, far is dark blue, no match is white; the scale ends at the 99th percentile."""
     valid = ~np.isnan(disparity_px)
     largest = float(np.percentile(disparity_px[valid], 99)) if valid.any() else 1.0
     share = np.clip(np.where(valid, disparity_px, 0) / largest, 0, 1)
-    picture: Array = cv2.applyColorMap(np.rint(255 * share).astype(np.uint8), cv2.COLORMAP_TURBO)
+    picture: Array = cv2.applyColorMap(np.rint(255 * share).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     picture[~valid] = NO_MATCH
     return picture
 

@@ -14,7 +14,16 @@ from ..loopback import HOST, LOCAL_NAMES
 from ..screen import console, progress_console, warn_of
 from .asked import AskedRecording, asked_recording
 from .chosen import chosen_config
-from .options import CellOption, ConfigOption, DisparitiesOption, MatcherOption, NetworkOption, RangeOption, SetOption
+from .options import (
+    CellOption,
+    ConfigOption,
+    DisparitiesOption,
+    MatcherOption,
+    MotionOption,
+    NetworkOption,
+    RangeOption,
+    SetOption,
+)
 
 if TYPE_CHECKING:
     from ..viewer import MapPage, Subject
@@ -31,6 +40,7 @@ def view_command(
     num_disparities: DisparitiesOption = None,
     cell: CellOption = None,
     max_range: RangeOption = None,
+    motion: MotionOption = None,
     settings: SetOption = None,
     port: Annotated[int, typer.Option(help="Of the page; the next free one where it is taken, 0 for any.")] = 8104,
     host: Annotated[str, typer.Option(help="Who may look: another one than this lets other machines in.")] = HOST,
@@ -46,7 +56,7 @@ def view_command(
 
     path = asked.recording
     if path.suffix in MAP_SUFFIXES or is_run(path):
-        given = (config, matcher, network, num_disparities, cell, max_range, settings or None)
+        given = (config, matcher, network, num_disparities, cell, max_range, motion, settings or None)
         if given != (None,) * len(given) or asked != AskedRecording(path):
             raise InvalidInputError(f"{path} is mapped already: --config, --start and the like are for recordings")
         subject = subject_of_run(path) if path.is_dir() else subject_of_map(path)
@@ -62,6 +72,7 @@ def view_command(
             num_disparities=num_disparities,
             cell=cell,
             max_range=max_range,
+            motion=motion,
             settings=settings,
         )
         subject = subject_of_recording(recording, chosen, asked.poses)

@@ -101,3 +101,13 @@ def test_the_command_tells_machines_the_same_and_ends_with_1_where_there_is_a_pr
     assert well.returncode == 0 and told["healthy"] and len(told["checks"]) > 15
     ill = subprocess.run([*line, "--runs", "/proc/sys"], capture_output=True, text=True, timeout=120)
     assert ill.returncode == 1 and not json.loads(ill.stdout)["healthy"]
+
+
+def test_kernels_that_no_other_process_will_find_are_told() -> None:
+    code = (
+        "import os; os.access = lambda *_, **__: False\n"
+        "from stereogrid.doctor import check_kernel_cache; print(check_kernel_cache().state)"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
+    assert done.stdout == f"{WARNING}\n", done.stderr
