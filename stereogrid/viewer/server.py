@@ -1,6 +1,7 @@
 """viser's server on this machine's loopback, shut to pages of other sites."""
 
 import io
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from http import HTTPStatus
@@ -25,6 +26,7 @@ def open_server(port: int, title: str, host: str = HOST) -> Any:
     """
     if not 0 <= port <= 0xFFFF:
         raise InvalidInputError(f"a port must be 0 to 65535, not {port}")
+    _check_host(host)
     try:
         import viser
         import websockets.asyncio.server as websocket_server
@@ -40,6 +42,17 @@ def open_server(port: int, title: str, host: str = HOST) -> Any:
     server.request_share_url = lambda *_, **__: None
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     return server
+
+
+def _check_host(host: str) -> None:
+    """viser waits for ever for a server that cannot be had at its address."""
+    try:
+        family, kind, *_, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind) as tried:
+            tried.bind(address)
+    except (OSError, UnicodeError) as error:
+        what = getattr(error, "strerror", None) or error
+        raise InvalidInputError(f"--host {host}: is no address of this machine ({what})") from None
 
 
 def url_of(server: Any) -> str:

@@ -22,7 +22,7 @@ from browsers import CHROMIUM, Browser, until
 from websockets.sync.client import connect
 
 from stereogrid.camera import StereoCamera
-from stereogrid.errors import MissingExtraError
+from stereogrid.errors import InvalidInputError, MissingExtraError
 from stereogrid.geometry import R_BASE_OPTICAL, from_rotation
 from stereogrid.grid import OccupancyGrid
 from stereogrid.viewer import LiveView
@@ -190,3 +190,9 @@ def test_a_browser_shows_the_map_as_it_grows(tmp_path: Path) -> None:
         finally:
             cv2.imwrite(str(tmp_path / "view.png"), browser.picture())
             browser.close()
+
+
+@pytest.mark.parametrize("host", ["nohost.invalid", "192.0.2.1"])
+def test_a_host_that_is_not_this_machine_is_refused_at_once(host):
+    with pytest.raises(InvalidInputError, match="is no address of this machine"):
+        open_server(0, "view", host=host)
